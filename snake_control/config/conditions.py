@@ -1,0 +1,125 @@
+"""Conditions 1 to 5 and the Assumptions of the paper that a configuration can break."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from snake_control.errors import ConfigError
+
+
+def check_conditions(
+    links: int,
+    head_links: int,
+    wheelless_links: Sequence[int],
+    head_scp_joints: Sequence[int],
+    joint_axes: Sequence[str],
+) -> None:
+    """Check a robot's structure against the paper's Section 2.
+
+    Args:
+        links: n, number of links.
+        head_links: n_h, number of links of the raised head part.
+        wheelless_links: links of the base part without wheels, counted from the head, from 1.
+        head_scp_joints: the n_h - 4 joints of the head part used as H-SCPs.
+        joint_axes: ``pitch`` or ``yaw`` for joints 1 .. n-1.
+
+    Raises:
+        ConfigError: names the Condition or Assumption, the value and what would satisfy it.
+    """
+    if head_links < 4:
+        raise ConfigError(
+            "robot.head_links",
+            head_links,
+            "Condition 5: at least 4 head links, or the head cannot take any position and attitude",
+        )
+    if links < head_links + 2:
+        raise ConfigError(
+            "robot.links",
+            links,
+            f"the base needs at least two links behind the {head_links} of the head: "
+            f"{head_links + 2} or more",
+        )
+    _check_axes(links, head_links, joint_axes)
+    _check_wheelless(links, head_links, wheelless_links)
+    _check_head_scps(head_links, head_scp_joints, joint_axes)
+    m = head_links - 4 + len(wheelless_links)
+    if not 1 <= m < links - 7:
+        raise ConfigError(
+            "robot.wheelless_links",
+            list(wheelless_links),
+            f"Condition 4: 1 <= m < n - 7 with m = (n_h - 4) + wheelless links; here m = {m} and "
+            f"n - 7 = {links - 7}, so the number of wheelless links must be "
+            f"{max(0, 5 - head_links)} to {links - 8 - (head_links - 4)}",
+        )
+
+
+def _check_axes(links: int, head_links: int, joint_axes: Sequence[str]) -> None:
+    field = "robot.joint_axes"
+    if len(joint_axes) != links - 1:
+        raise ConfigError(field, list(joint_axes), f"give {links - 1} axes, one for each joint")
+    for joint, axis in enumerate(joint_axes, start=1):
+        if axis not in ("pitch", "yaw"):
+            raise ConfigError(
+                f"{field}[{joint - 1}]", axis, f"Assumption 1: joint {joint} is pitch or yaw"
+            )
+        if joint > head_links and axis != "yaw":
+            raise ConfigError(
+                f"{field}[{joint - 1}]",
+                axis,
+                f"Assumption 2: joint {joint} belongs to the base part and must be yaw",
+            )
+    if joint_axes[head_links - 1] != "pitch":
+        raise ConfigError(
+            f"{field}[{head_links - 1}]",
+            joint_axes[head_links - 1],
+            f"Assumption 2: joint {head_links} joins head and base and must be pitch",
+        )
+    if len(set(joint_axes[:head_links])) < 2:
+        raise ConfigError(
+            field,
+            list(joint_axes[:head_links]),
+            "Condition 2: the joints of the head part must not all turn about the same axis",
+        )
+
+
+def _check_wheelless(links: int, head_links: int, wheelless_links: Sequence[int]) -> None:
+    field = "robot.wheelless_links"
+    given = list(wheelless_links)
+    if sorted(set(given)) != given:
+        raise ConfigError(field, given, "give each link once, in rising order")
+    if head_links + 1 in given:
+        raise ConfigError(
+            field,
+            given,
+            f"Assumption 5: link {head_links + 1}, the first of the base part, needs wheels",
+        )
+    if links in given:
+        raise ConfigError(field, given, f"Condition 1: link {links}, the tail, needs wheels")
+    for link in given:
+        if not head_links + 2 <= link <= links - 1:
+            raise ConfigError(
+                field,
+                given,
+                f"link {link} is not between the first base link and the tail: "
+                f"{head_links + 2} to {links - 1}",
+            )
+
+
+def _check_head_scps(
+    head_links: int, head_scp_joints: Sequence[int], joint_axes: Sequence[str]
+) -> None:
+    field = "robot.head_scp_joints"
+    given = list(head_scp_joints)
+    if len(given) != head_links - 4:
+        raise ConfigError(
+            field, given, f"give m_h = n_h - 4 = {head_links - 4} joints of the head part"
+        )
+    if sorted(set(given)) != given or any(not 1 <= joint <= head_links for joint in given):
+        raise ConfigError(field, given, f"give different joints in rising order, 1 to {head_links}")
+    rest = {axis for j, axis in enumerate(joint_axes[:head_links], start=1) if j not in given}
+    if len(rest) < 2:
+        raise ConfigError(
+            field,
+            given,
+            "Condition 3: the head joints that are not H-SCPs must not all turn about the same axis",
+        )

@@ -1,0 +1,159 @@
+"""The groups of the configuration that belong to one node each."""
+
+from __future__ import annotations
+
+import dataclasses
+
+from snake_control.config.parameter import parameter
+
+SDK_BAUD_RATES = (9600, 19200, 57600, 115200, 500000, 1000000)
+"""Rates that an AX-12 can be set to and that dynamixel_sdk can open."""
+
+
+@dataclasses.dataclass(frozen=True)
+class BusDriverConfig:
+    """Parameters of the node ``bus_driver``."""
+
+    port: str = parameter("/dev/ttyUSB0", "serial device, or any path that leads to one")
+    baud_rate: int = parameter(1000000, "bits per second", choices=SDK_BAUD_RATES)
+    rate_hz: float = parameter(50.0, "bus cycles per second", low=1.0, high=500.0)
+    command_timeout_s: float = parameter(
+        0.1, "without a command this fresh the joints hold [s]", low=0.02, high=1.0
+    )
+    reply_timeout_s: float = parameter(
+        0.008, "how long to wait for a reply beyond its time on the wire [s]", low=0.001, high=0.1
+    )
+    retries: int = parameter(1, "how often a missed reply is asked for again", low=0, high=5)
+    lost_after_misses: int = parameter(
+        10, "missed reads in a row after which a servo counts as lost", low=1, high=1000
+    )
+    look_ahead_s: float = parameter(
+        0.15, "how far ahead of the joint its goal is kept, as time at its speed [s]",
+        low=0.04, high=1.0,
+    )
+    acceleration_limit_rad_s2: float = parameter(
+        0.0, "limit of the change of commanded speed, 0 for none [rad/s^2]", low=0.0, high=1e4
+    )
+    torque_on_activate: bool = parameter(
+        True, "switch torque on at activation, after goals were seeded from present positions"
+    )
+    torque_off_on_exit: bool = parameter(
+        False, "switch torque off when the node ends (a raised head then falls)"
+    )
+    diagnostics_period_s: float = parameter(1.0, "period of /diagnostics [s]", low=0.1, high=60.0)
+    temperature_warn_c: float = parameter(60.0, "warn from this temperature [degC]", low=0.0)
+    voltage_low_warn_v: float = parameter(9.5, "warn below this voltage [V]", low=0.0)
+    voltage_high_warn_v: float = parameter(12.6, "warn above this voltage [V]", low=0.0)
+    autostart: bool = parameter(True, "configure and activate without a lifecycle manager")
+
+
+@dataclasses.dataclass(frozen=True)
+class PoseInputConfig:
+    """Parameters of the node ``pose_input``."""
+
+    frame_id: str = parameter("world", "frame in which the head pose is published")
+    child_frame_id: str = parameter("link_1", "frame of the head, origin at its tip")
+    cutoff_hz: float = parameter(
+        3.0, "bandwidth of the filter that yields pose and twist", low=0.1, high=100.0
+    )
+    timeout_s: float = parameter(
+        0.1, "without a pose this fresh the head pose is not valid [s]", low=0.01, high=10.0
+    )
+
+
+@dataclasses.dataclass(frozen=True)
+class ScpControllerConfig:
+    """Parameters of the node ``scp_controller`` beside the shared groups."""
+
+    rate_hz: float = parameter(50.0, "control steps per second", low=1.0, high=500.0)
+    joint_states_timeout_s: float = parameter(
+        0.1, "joint states older than this command zero [s]", low=0.02, high=1.0
+    )
+    head_timeout_s: float = parameter(
+        0.1, "head pose older than this commands zero [s]", low=0.02, high=1.0
+    )
+    reference_timeout_s: float = parameter(
+        0.2, "reference older than this commands zero [s]", low=0.02, high=10.0
+    )
+    enabled: bool = parameter(True, "follow references from the start (see ~/enable)")
+    frame_id: str = parameter("world", "frame in which head pose and reference are given")
+
+
+@dataclasses.dataclass(frozen=True)
+class TrajectoryGeneratorConfig:
+    """Parameters of the node ``trajectory_generator``; defaults are Table 1's trajectory."""
+
+    rate_hz: float = parameter(50.0, "references per second", low=1.0, high=500.0)
+    frame_id: str = parameter("world", "frame of the references")
+    trajectory: str = parameter(
+        "line", "what ~/start follows: line, or hold (stay where the head is)",
+        choices=("line", "hold"),
+    )
+    start_from: str = parameter(
+        "given", "given: the line starts at start_pose; head: it starts where the head is",
+        choices=("given", "head"),
+    )
+    start_pose: tuple[float, ...] = parameter(
+        (0.0, 0.0, 0.2, 0.39269908169872414, 0.39269908169872414, 0.0),
+        "w_d(0) = [x, y, z, R, P, Y] of the line [m, rad]",
+    )
+    velocity: tuple[float, ...] = parameter(
+        (0.01, 0.0, 0.0, 0.0, 0.0, 0.0), "w_d's velocity along the line [m/s, rad/s]"
+    )
+    duration_s: float = parameter(
+        0.0, "length of the line, 0 for endless; its end is held [s]", low=0.0
+    )
+    autostart: bool = parameter(False, "start as soon as the head pose is known")
+    cmd_vel_timeout_s: float = parameter(
+        0.5, "without cmd_vel this fresh the teleoperated head is brought to rest [s]",
+        low=0.05, high=10.0,
+    )
+    max_linear_speed_m_s: float = parameter(
+        0.05, "cmd_vel is limited to this speed [m/s]", low=1e-4, high=10.0
+    )
+    max_angular_speed_rad_s: float = parameter(
+        0.3, "cmd_vel is limited to this angular speed [rad/s]", low=1e-4, high=10.0
+    )
+    max_linear_acceleration_m_s2: float = parameter(
+        0.1, "how fast the teleoperated head speeds up and slows down [m/s^2]", low=1e-3, high=100.0
+    )
+    max_angular_acceleration_rad_s2: float = parameter(
+        1.0, "the same for its rotation [rad/s^2]", low=1e-3, high=100.0
+    )
+
+
+@dataclasses.dataclass(frozen=True)
+class MockBusConfig:
+    """Parameters of the node ``mock_bus``: simulated servos, floor and motion capture."""
+
+    port: str = parameter(
+        "/tmp/snake_control_mock_bus", "symbolic link to the serial port that the mock opens"
+    )
+    seed: int = parameter(0, "seed of all random numbers", low=0)
+    step_hz: float = parameter(500.0, "simulation steps per second", low=50.0, high=10000.0)
+    frame_id: str = parameter("world", "frame of the motion capture")
+    mocap_rate_hz: float = parameter(100.0, "motion capture poses per second", low=1.0, high=1000.0)
+    mocap_position_noise_m: float = parameter(
+        0.0005, "standard deviation of the measured position, per axis [m]", low=0.0, high=1.0
+    )
+    mocap_rotation_noise_rad: float = parameter(
+        0.002, "standard deviation of the measured rotation, per axis [rad]", low=0.0, high=1.0
+    )
+    mocap_delay_s: float = parameter(
+        0.02, "from capture (the stamp) to publication [s]", low=0.0, high=1.0
+    )
+    return_delay_raw: int = parameter(
+        250, "Return Delay Time of every servo at power-on [2 us]", low=0, high=254
+    )
+    supply_voltage_v: float = parameter(11.1, "supply voltage [V]", low=0.0, high=30.0)
+    stall_torque_nm: float = parameter(1.5, "stall torque at 12 V [N m]", low=0.01, high=100.0)
+    no_load_speed_rad_s: float = parameter(
+        6.18, "no-load speed at 12 V [rad/s]", low=0.1, high=100.0
+    )
+    acceleration_rad_s2: float = parameter(
+        60.0, "largest acceleration of a servo [rad/s^2]", low=0.1, high=1e5
+    )
+    friction_torque_nm: float = parameter(
+        0.1, "torque that gear friction holds at rest [N m]", low=0.0, high=10.0
+    )
+    wire_time: bool = parameter(True, "let bytes take the time that the baud rate says")

@@ -1,0 +1,287 @@
+"""The shared groups of the configuration: the robot, its servos, and the controller's gains."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from snake_control.config.conditions import check_conditions
+from snake_control.config.parameter import parameter
+from snake_control.errors import ConfigError
+
+_DEGREE = math.pi / 180
+_SERVO_HALF_RANGE_RAD = 150 * _DEGREE
+
+
+def per_joint(field: str, values: tuple, joints: int) -> tuple:
+    """Return ``values`` as one entry for each joint; a single entry stands for all joints.
+
+    Raises:
+        ConfigError: any other length.
+    """
+    if len(values) == joints:
+        return values
+    if len(values) == 1:
+        return values * joints
+    raise ConfigError(
+        field, list(values), f"give {joints} entries, one for each joint, or one for all"
+    )
+
+
+@dataclasses.dataclass(frozen=True)
+class RobotConfig:
+    """Structure and measures of the robot; defaults are the robot of the paper (Section 5)."""
+
+    links: int = parameter(12, "n, number of links", low=6, high=250)
+    head_links: int = parameter(5, "n_h, number of links of the raised head part", low=1, high=249)
+    wheelless_links: tuple[int, ...] = parameter(
+        (7, 9, 11),
+        "links of the base part without wheels, counted from the head, from 1 ([0] for none)",
+        low=0,
+    )
+    head_scp_joints: tuple[int, ...] = parameter(
+        (3,),
+        "the n_h - 4 joints of the head part that are H-SCPs ([0] for none)",
+        low=0,
+    )
+    joint_axes: tuple[str, ...] = parameter(
+        ("pitch", "yaw", "pitch", "yaw", "pitch") + ("yaw",) * 6,
+        "axis of each joint, pitch (y) or yaw (z), joint 1 first",
+    )
+    half_length_m: float = parameter(0.034, "l, half the length of a link [m]", low=1e-3, high=10.0)
+    wheel_offset_m: float = parameter(
+        0.032, "l_w, from the centre of a link to each wheel [m]", low=1e-4, high=10.0
+    )
+    wheel_radius_m: float = parameter(
+        0.02, "height of the base link centres above the floor [m]", low=0.0, high=10.0
+    )
+    link_mass_kg: tuple[float, ...] = parameter(
+        (0.1,), "mass of each link, or one for all [kg]", low=1e-6, high=1e3
+    )
+    joint_limits_rad: tuple[float, ...] = parameter(
+        (2.6,),
+        "largest angle of each joint to both sides, or one for all; or lower and upper bound of "
+        "each joint in turn (2 (n - 1) entries) [rad]",
+        low=-2 * math.pi,
+        high=2 * math.pi,
+    )
+    joint_speed_limits_rad_s: tuple[float, ...] = parameter(
+        (5.5,), "largest speed of each joint, or one for all [rad/s]", low=1e-3, high=100.0
+    )
+    start_joint_angles_rad: tuple[float, ...] = parameter(
+        (-0.11, 0.0, 0.0, 0.0, 1.1)
+        + tuple(math.pi / d for d in (-9, 6, 6, -9, -6, -10)),
+        "posture at the start of the experiment, phi(0) of Table 1 [rad]",
+        low=-2 * math.pi,
+        high=2 * math.pi,
+    )
+
+    def __post_init__(self) -> None:
+        # rcl leaves a parameter given as [] uninitialised, so [0] is how a file says "none".
+        for name in ("wheelless_links", "head_scp_joints"):
+            if getattr(self, name) == (0,):
+                object.__setattr__(self, name, ())
+        check_conditions(
+            self.links,
+            self.head_links,
+            self.wheelless_links,
+            self.head_scp_joints,
+            self.joint_axes,
+        )
+        masses = self.link_mass_kg
+        if len(masses) not in (1, self.links):
+            raise ConfigError(
+                "robot.link_mass_kg", list(masses), f"give one mass for all or {self.links}"
+            )
+        if len(masses) == 1:
+            object.__setattr__(self, "link_mass_kg", masses * self.links)
+        self._set_per_joint("joint_speed_limits_rad_s")
+        self._set_per_joint("start_joint_angles_rad")
+        self._check_limits()
+
+    def _set_per_joint(self, name: str) -> None:
+        values = per_joint(f"robot.{name}", getattr(self, name), self.joints)
+        object.__setattr__(self, name, values)
+
+    def _check_limits(self) -> None:
+        field = "robot.joint_limits_rad"
+        limits = self.joint_limits_rad
+        if len(limits) != 2 * self.joints:
+            symmetric = per_joint(field, limits, self.joints)
+            for i, limit in enumerate(symmetric):
+                if limit <= 0:
+                    raise ConfigError(f"{field}[{i}]", limit, "allowed: more than 0")
+            limits = tuple(bound for limit in symmetric for bound in (-limit, limit))
+            object.__setattr__(self, "joint_limits_rad", limits)
+        for joint in range(1, self.joints + 1):
+            lower, upper = self.joint_range(joint)
+            if not lower < upper:
+                raise ConfigError(
+                    field, [lower, upper], f"lower bound of joint {joint} must be below its upper"
+                )
+            start = self.start_joint_angles_rad[joint - 1]
+            if not lower <= start <= upper:
+                raise ConfigError(
+                    f"robot.start_joint_angles_rad[{joint - 1}]",
+                    start,
+                    f"joint {joint} must start inside its range {lower:g} to {upper:g}",
+                )
+
+    @property
+    def joints(self) -> int:
+        """Number of joints, n - 1."""
+        return self.links - 1
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """``joint_1`` .. ``joint_(n-1)``."""
+        return tuple(f"joint_{i}" for i in range(1, self.links))
+
+    @property
+    def base_scp_joints(self) -> tuple[int, ...]:
+        """B-SCPs: joint i_k - 1 for every wheelless link i_k (paper, Section 2)."""
+        return tuple(link - 1 for link in self.wheelless_links)
+
+    @property
+    def scp_joints(self) -> tuple[int, ...]:
+        """All SCPs, H-SCPs first: the order of phi_tilde."""
+        return self.head_scp_joints + self.base_scp_joints
+
+    @property
+    def wheeled_links(self) -> tuple[int, ...]:
+        """Base links with wheels, ascending."""
+        return tuple(
+            link
+            for link in range(self.head_links + 1, self.links + 1)
+            if link not in self.wheelless_links
+        )
+
+    def joint_range(self, joint: int) -> tuple[float, float]:
+        """Lower and upper bound of joint 1 .. n-1 [rad]."""
+        return self.joint_limits_rad[2 * joint - 2], self.joint_limits_rad[2 * joint - 1]
+
+
+@dataclasses.dataclass(frozen=True)
+class ServosConfig:
+    """How joints map to servos, and the RAM settings every servo gets at activation."""
+
+    ids: tuple[int, ...] = parameter(
+        (0,), "bus id of each joint's servo ([0]: 1 .. n-1 in joint order)", low=0, high=252
+    )
+    directions: tuple[int, ...] = parameter(
+        (1,), "+1 if the servo's counter-clockwise is the joint's positive direction, else -1",
+        choices=(1, -1),
+    )
+    zero_offsets_rad: tuple[float, ...] = parameter(
+        (0.0,),
+        "servo angle (counter-clockwise from its centre) at joint angle 0 [rad]",
+        low=-_SERVO_HALF_RANGE_RAD,
+        high=_SERVO_HALF_RANGE_RAD,
+    )
+    velocity_modes: tuple[str, ...] = parameter(
+        ("joint",),
+        "joint: speed-regulated moves to a goal a little ahead; wheel: open-loop output, no limits",
+        choices=("joint", "wheel"),
+    )
+    accepted_models: tuple[int, ...] = parameter(
+        (12, 18, 300), "model numbers accepted at start (AX-12A 12, AX-18A 18, AX-12W 300)", low=0
+    )
+    compliance_margin_ticks: tuple[int, ...] = parameter(
+        (1,), "position error without output, both directions [0.293 deg]", low=0, high=254
+    )
+    compliance_slope: tuple[int, ...] = parameter(
+        (32,), "position error over which the output rises to its maximum [0.293 deg]",
+        choices=(2, 4, 8, 16, 32, 64, 128),
+    )
+    punch_raw: tuple[int, ...] = parameter(
+        (32,), "minimum output [1/1023 of the maximum]", low=0, high=1023
+    )
+    torque_limit: tuple[float, ...] = parameter(
+        (1.0,), "largest output [fraction of the maximum]", low=0.01, high=1.0
+    )
+
+    @staticmethod
+    def for_joints(config: ServosConfig, joints: int) -> ServosConfig:
+        """Return ``config`` with every per-joint list expanded to ``joints`` entries.
+
+        Raises:
+            ConfigError: a list of the wrong length, or an id given twice.
+        """
+        ids = config.ids
+        if ids == (0,):
+            ids = tuple(range(1, joints + 1))
+        if len(ids) != joints:
+            raise ConfigError("servos.ids", list(ids), f"give {joints} ids, one for each joint")
+        doubled = sorted({i for i in ids if ids.count(i) > 1})
+        if doubled:
+            raise ConfigError("servos.ids", list(ids), f"every id once; {doubled[0]} is repeated")
+        changes: dict[str, object] = {"ids": ids}
+        for field in dataclasses.fields(config):
+            if field.name not in ("ids", "accepted_models"):
+                values = getattr(config, field.name)
+                changes[field.name] = per_joint(f"servos.{field.name}", values, joints)
+        return dataclasses.replace(config, **changes)  # type: ignore[arg-type]
+
+
+CASES: Mapping[int, Mapping[str, float]] = MappingProxyType(
+    {
+        1: MappingProxyType({"a_h": 0.0, "a_b": 0.0, "a_prime": 0.0, "b_prime": 0.0}),
+        2: MappingProxyType({"a_h": 1e5, "a_b": 1.0, "a_prime": 1e-11, "b_prime": 0.0}),
+        3: MappingProxyType({"a_h": 1e5, "a_b": 1.0, "a_prime": 1e-11, "b_prime": 3.0}),
+    }
+)
+"""Sub-task weights of the paper's Cases 1 to 3 (Section 5)."""
+
+
+@dataclasses.dataclass(frozen=True)
+class ControllerConfig:
+    """Gains of the SCP redundancy controller, equations (22), (25), (27), (30)."""
+
+    case: int = parameter(
+        3,
+        "preset of sub-task weights: 1 SCPs still, 2 singularity avoidance, 3 and no falling",
+        choices=(1, 2, 3),
+    )
+    K: tuple[float, ...] = parameter(
+        (0.4, 0.25, 0.5, 0.1, 0.1, 0.1),
+        "diagonal of K for x_h, y_h, z_h, R, P, Y [1/s]; zeros for the SCPs may follow",
+        low=0.0,
+        high=100.0,
+    )
+    a_h: float | None = parameter(
+        None, "gain of the H-SCP sub-task (25); default from the case", low=0.0, high=1e12
+    )
+    a_b: float | None = parameter(
+        None, "gain of the B-SCP sub-task (27); default from the case", low=0.0, high=1e12
+    )
+    a_prime: float | None = parameter(
+        None, "weight of V_b1 in (30); default from the case", low=0.0, high=1e12
+    )
+    b_prime: float | None = parameter(
+        None, "weight of d_min in (30) [1/m]; default from the case", low=0.0, high=1e12
+    )
+
+    def __post_init__(self) -> None:
+        for name, value in CASES[self.case].items():
+            if getattr(self, name) is None:
+                object.__setattr__(self, name, value)
+
+    @staticmethod
+    def for_scps(config: ControllerConfig, m: int) -> ControllerConfig:
+        """Return ``config`` with K cut to its six entries, checked against ``m`` SCPs.
+
+        Raises:
+            ConfigError: K has another length than 6 or 6 + m, or feeds back an SCP angle.
+        """
+        K = config.K
+        if len(K) not in (6, 6 + m):
+            raise ConfigError("controller.K", list(K), f"give 6 gains, or 6 + m = {6 + m}")
+        if any(K[6:]):
+            raise ConfigError(
+                "controller.K",
+                list(K),
+                "the gains of the SCPs must be 0: (25) and (27) give them velocities, not angles",
+            )
+        return dataclasses.replace(config, K=K[:6])

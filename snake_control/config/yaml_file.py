@@ -1,0 +1,117 @@
+"""Reads ROS parameter files the way rcl reads them, without ROS, and with errors that name a field."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from snake_control.errors import ConfigError, ConfigFileError
+
+
+class _RclLoader(yaml.SafeLoader):
+    """PyYAML follows YAML 1.1, where 1e-11 and 1.0e5 are texts; rcl reads them as doubles."""
+
+
+_RclLoader.yaml_implicit_resolvers = {
+    first: [(tag, regexp) for tag, regexp in resolvers if tag != "tag:yaml.org,2002:float"]
+    for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()
+}
+_RclLoader.add_implicit_resolver(
+    "tag:yaml.org,2002:float",
+    re.compile(
+        r"""^[-+]?(?:(?:[0-9]+\.[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?
+             |[0-9]+[eE][-+]?[0-9]+
+             |\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN))$""",
+        re.VERBOSE,
+    ),
+    list("-+0123456789."),
+)
+
+
+def read_sections(path: str | Path) -> list[tuple[str, dict[str, Any]]]:
+    """Return the sections of a ROS parameter file as (node pattern, flat parameters).
+
+    Nested maps are flattened with dots (``robot: {links: 12}`` becomes ``robot.links``).
+
+    Raises:
+        ConfigFileError: the file is missing, is no YAML, or has no ``ros__parameters``.
+        ConfigError: a list that rcl would abort on: mixed types, empty, or of maps.
+    """
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+    except OSError as error:
+        raise ConfigFileError(str(path), f"cannot be read: {error.strerror}") from error
+    try:
+        tree = yaml.load(text, Loader=_RclLoader)
+    except yaml.YAMLError as error:
+        raise ConfigFileError(str(path), f"is not valid YAML: {error}") from error
+    if tree is None:
+        return []
+    if not isinstance(tree, Mapping):
+        raise ConfigFileError(str(path), "holds no map; expected '/**: ros__parameters: ...'")
+    return [
+        (pattern, _flatten("", parameters)) for pattern, parameters in _sections(path, "", tree)
+    ]
+
+
+def _sections(
+    path: str | Path, prefix: str, tree: Mapping[Any, Any]
+) -> list[tuple[str, Mapping[str, Any]]]:
+    found: list[tuple[str, Mapping[str, Any]]] = []
+    for key, value in tree.items():
+        pattern = f"{prefix}/{str(key).lstrip('/')}"
+        if not isinstance(value, Mapping):
+            raise ConfigFileError(
+                str(path), f"'{key}' stands where a node name with 'ros__parameters:' is expected"
+            )
+        if "ros__parameters" in value:
+            parameters = value["ros__parameters"]
+            if not isinstance(parameters, Mapping):
+                raise ConfigFileError(str(path), f"'{key}: ros__parameters' holds no map")
+            found.append((pattern, parameters))
+            value = {k: v for k, v in value.items() if k != "ros__parameters"}
+        found.extend(_sections(path, pattern, value))
+    return found
+
+
+def _flatten(prefix: str, tree: Mapping[Any, Any]) -> dict[str, Any]:
+    flat: dict[str, Any] = {}
+    for key, value in tree.items():
+        name = f"{prefix}{key}"
+        if isinstance(value, Mapping):
+            flat.update(_flatten(f"{name}.", value))
+        else:
+            _check_as_rcl(name, value)
+            flat[name] = value
+    return flat
+
+
+def _check_as_rcl(field: str, value: object) -> None:
+    if value is None:
+        raise ConfigError(field, value, "give a value, or remove the line")
+    if not isinstance(value, list):
+        return
+    if not value:
+        raise ConfigError(field, value, "ROS ignores an empty list; remove the line (or see docs)")
+    kinds = {type(element) for element in value}
+    if kinds & {dict, list}:
+        raise ConfigError(field, value, "ROS parameters hold no lists of lists or maps")
+    if kinds == {int, float}:
+        raise ConfigError(field, value, "ROS refuses mixed lists: write all as decimals (0 as 0.0)")
+    if len(kinds) > 1:
+        raise ConfigError(field, value, "ROS refuses lists of mixed types")
+
+
+def matches(pattern: str, node: str) -> bool:
+    """Whether a section's pattern applies to the fully qualified node name, as in rcl.
+
+    ``*`` stands for one name, ``**`` for any number of them.
+    """
+    regexp = ""
+    for token in pattern.strip("/").split("/"):
+        regexp += {"**": r"(?:/[^/]+)*", "*": r"/[^/]+"}.get(token, "/" + re.escape(token))
+    return re.fullmatch(regexp, node) is not None

@@ -1,0 +1,70 @@
+"""Every error that this package raises on purpose.
+
+Subclasses carry their data and also derive from the built-in that a caller would catch.
+"""
+
+
+class SnakeError(Exception):
+    """Base of all errors raised on purpose by snake_control."""
+
+
+class ConfigError(SnakeError, ValueError):
+    """A configuration value that is missing, of the wrong type, or not allowed.
+
+    Attributes:
+        field: dotted name of the field, as in the YAML file (``robot.links``).
+        value: what was given; ``None`` if nothing was.
+        allowed: what would be accepted, in words.
+    """
+
+    def __init__(self, field: str, value: object, allowed: str) -> None:
+        self.field = field
+        self.value = value
+        self.allowed = allowed
+        super().__init__(f"{field} = {value!r}: {allowed}")
+
+
+class ConfigFileError(SnakeError, ValueError):
+    """A parameter file that cannot be read, or that rcl would refuse.
+
+    Attributes:
+        path: the file.
+    """
+
+    def __init__(self, path: str, reason: str) -> None:
+        self.path = path
+        super().__init__(f"{path}: {reason}")
+
+
+class ModelError(SnakeError, ValueError):
+    """A model quantity was asked for with an argument of the wrong shape or without a finite value."""
+
+
+class SingularError(SnakeError, ArithmeticError):
+    """The posture is singular: a matrix that the control law inverts has no inverse.
+
+    Attributes:
+        matrix: name of the matrix in the paper (``B_tilde``).
+        sigma_min: its smallest singular value.
+    """
+
+    def __init__(self, matrix: str, sigma_min: float) -> None:
+        self.matrix = matrix
+        self.sigma_min = sigma_min
+        super().__init__(f"{matrix} is singular: smallest singular value {sigma_min:.3g}")
+
+
+class BusError(SnakeError, OSError):
+    """The serial port cannot be opened or stopped working."""
+
+
+class ServoError(SnakeError, RuntimeError):
+    """One or more servos are missing, of the wrong kind or wrongly set up.
+
+    Attributes:
+        findings: one sentence per servo and finding.
+    """
+
+    def __init__(self, findings: list[str]) -> None:
+        self.findings = list(findings)
+        super().__init__("; ".join(findings))

@@ -1,0 +1,90 @@
+"""Every topic and service of the nodes: name, type and quality of service, in one place.
+
+All names are relative, so that one namespace holds one robot; `~/x` belongs to one node.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import PoseStamped, TwistStamped
+from nav_msgs.msg import Odometry, Path
+from rclpy.qos import (
+    DurabilityPolicy,
+    HistoryPolicy,
+    QoSProfile,
+    ReliabilityPolicy,
+    qos_profile_sensor_data,
+)
+from sensor_msgs.msg import JointState
+from snake_interfaces.msg import (
+    BusState,
+    ControllerState,
+    HeadReference,
+    JointVelocityCommand,
+    PlantState,
+    PoseStatus,
+)
+from std_srvs.srv import SetBool, Trigger
+from visualization_msgs.msg import MarkerArray
+
+
+@dataclasses.dataclass(frozen=True)
+class Topic:
+    """A topic's relative name, message type and QoS (the same on both sides)."""
+
+    name: str
+    type: type
+    qos: QoSProfile
+
+
+@dataclasses.dataclass(frozen=True)
+class Service:
+    """A service's name and type."""
+
+    name: str
+    type: Any
+
+
+def _reliable(depth: int, durability: DurabilityPolicy = DurabilityPolicy.VOLATILE) -> QoSProfile:
+    return QoSProfile(
+        history=HistoryPolicy.KEEP_LAST,
+        depth=depth,
+        reliability=ReliabilityPolicy.RELIABLE,
+        durability=durability,
+    )
+
+
+_STATE = _reliable(10)
+# Of commands and references only the newest counts.
+_COMMAND = _reliable(1)
+_LATCHED = _reliable(1, DurabilityPolicy.TRANSIENT_LOCAL)
+
+JOINT_VELOCITY_COMMAND = Topic("joint_velocity_command", JointVelocityCommand, _COMMAND)
+JOINT_STATES = Topic("joint_states", JointState, _STATE)
+BUS_STATE = Topic("bus_state", BusState, _STATE)
+# Absolute by ROS convention: one aggregator serves the whole graph.
+DIAGNOSTICS = Topic("/diagnostics", DiagnosticArray, _STATE)
+
+MOCAP_POSE = Topic("mocap/pose", PoseStamped, qos_profile_sensor_data)
+HEAD_ODOMETRY = Topic("head/odometry", Odometry, _STATE)
+HEAD_STATUS = Topic("head/status", PoseStatus, _STATE)
+
+HEAD_REFERENCE = Topic("head/reference", HeadReference, _COMMAND)
+HEAD_PLANNED_PATH = Topic("head/planned_path", Path, _LATCHED)
+CMD_VEL = Topic("cmd_vel", TwistStamped, _COMMAND)
+
+CONTROLLER_STATE = Topic("controller_state", ControllerState, _STATE)
+MARKERS = Topic("markers", MarkerArray, _COMMAND)
+
+PLANT_STATE = Topic("ground_truth/plant_state", PlantState, _STATE)
+
+SET_TORQUE = Service("~/set_torque", SetBool)
+RECOVER = Service("~/recover", Trigger)
+EMERGENCY_STOP = Service("~/emergency_stop", Trigger)
+RESET_EMERGENCY_STOP = Service("~/reset_emergency_stop", Trigger)
+ENABLE = Service("~/enable", SetBool)
+START = Service("~/start", Trigger)
+STOP = Service("~/stop", Trigger)
