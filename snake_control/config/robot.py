@@ -243,24 +243,34 @@ class ControllerConfig:
         3,
         "preset of sub-task weights: 1 SCPs still, 2 singularity avoidance, 3 and no falling",
         choices=(1, 2, 3),
+        run_time=True,
     )
     K: tuple[float, ...] = parameter(
         (0.4, 0.25, 0.5, 0.1, 0.1, 0.1),
         "diagonal of K for x_h, y_h, z_h, R, P, Y [1/s]; zeros for the SCPs may follow",
         low=0.0,
         high=100.0,
+        run_time=True,
     )
     a_h: float | None = parameter(
-        None, "gain of the H-SCP sub-task (25); default from the case", low=0.0, high=1e12
+        None, "gain of the H-SCP sub-task (25); default from the case", low=0.0,
+        high=1e12,
+        run_time=True,
     )
     a_b: float | None = parameter(
-        None, "gain of the B-SCP sub-task (27); default from the case", low=0.0, high=1e12
+        None, "gain of the B-SCP sub-task (27); default from the case", low=0.0,
+        high=1e12,
+        run_time=True,
     )
     a_prime: float | None = parameter(
-        None, "weight of V_b1 in (30); default from the case", low=0.0, high=1e12
+        None, "weight of V_b1 in (30); default from the case", low=0.0,
+        high=1e12,
+        run_time=True,
     )
     b_prime: float | None = parameter(
-        None, "weight of d_min in (30) [1/m]; default from the case", low=0.0, high=1e12
+        None, "weight of d_min in (30) [1/m]; default from the case", low=0.0,
+        high=1e12,
+        run_time=True,
     )
 
     def __post_init__(self) -> None:

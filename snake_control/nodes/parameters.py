@@ -1,0 +1,142 @@
+"""Declares the configuration as ROS parameters of a node and keeps one validated snapshot."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from typing import Any
+
+from rcl_interfaces.msg import (
+    FloatingPointRange,
+    IntegerRange,
+    ParameterDescriptor,
+    SetParametersResult,
+)
+from rclpy.node import Node
+from rclpy.parameter import Parameter as RosParameter
+
+from snake_control.config import (
+    CASES,
+    Config,
+    Parameter,
+    from_parameters,
+    is_ros_parameter,
+    known_parameters,
+    refuse_unknown,
+)
+from snake_control.errors import ConfigError
+
+
+class NodeParameters:
+    """The configuration of one node, as ROS parameters.
+
+    The node must have been made with ``automatically_declare_parameters_from_overrides=True``:
+    that is how unknown parameters come to light and are refused.
+
+    Attributes:
+        config: the snapshot in force; replaced as a whole when a parameter changes.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        kind: str,
+        on_change: Callable[[Config], None] | None = None,
+    ) -> None:
+        """Declare all parameters of a kind of node and validate what was given.
+
+        Args:
+            node: the node to declare them on.
+            kind: ``bus_driver``, ``pose_input``, ... (the node itself may be renamed).
+            on_change: called with the new snapshot after a run-time change was accepted.
+
+        Raises:
+            ConfigError: names the parameter, its value and what is allowed.
+        """
+        self._node = node
+        self._kind = kind
+        self._on_change = on_change
+        self._known = known_parameters((kind,))
+        given = {n: p.value for n, p in node.get_parameters_by_prefix("").items()}
+        # A file may serve all nodes through one /** section.
+        known_to_any = known_parameters(
+            ("bus_driver", "pose_input", "scp_controller", "trajectory_generator", "mock_bus")
+        )
+        for name, value in given.items():
+            if not is_ros_parameter(name):
+                refuse_unknown(name, value, known_to_any)
+        self._explicit = {name: value for name, value in given.items() if name in self._known}
+        self.config = from_parameters(kind, self._explicit)
+        for name, item in self._known.items():
+            if name in given:
+                node.set_descriptor(name, _descriptor(item))
+            else:
+                node.declare_parameter(name, self._effective(name), _descriptor(item))
+        node.add_on_set_parameters_callback(self._check_change)
+        node.add_post_set_parameters_callback(self._take_change)
+
+    def _effective(self, name: str) -> Any:
+        """Value in force of a parameter nobody gave; None where an empty list is meant."""
+        item = self._known[name]
+        value = item.default
+        if value is None:
+            value = CASES[self.config.controller.case][name.rpartition(".")[2]]
+        return list(value) if item.is_list else value
+
+    def _check_change(self, changed: Iterable[RosParameter]) -> SetParametersResult:
+        try:
+            from_parameters(self._kind, self._explicit | self._ours(changed))
+        except ConfigError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        return SetParametersResult(successful=True)
+
+    def _take_change(self, changed: Iterable[RosParameter]) -> None:
+        values = self._ours(changed)
+        # Setting the case makes weights follow that nobody set; those are no explicit values.
+        followers = {n for n, v in values.items() if self._is_follower(n, v)}
+        values = {n: v for n, v in values.items() if n not in followers}
+        if not values:
+            return
+        self._explicit |= values
+        self.config = from_parameters(self._kind, self._explicit)
+        if "controller.case" in values:
+            self._node.set_parameters(
+                [
+                    RosParameter(name, value=self._effective(name))
+                    for name, item in self._known.items()
+                    if item.default is None and name not in self._explicit
+                ]
+            )
+        if self._on_change is not None:
+            self._on_change(self.config)
+
+    def _is_follower(self, name: str, value: object) -> bool:
+        return (
+            self._known[name].default is None
+            and name not in self._explicit
+            and value == self._effective(name)
+        )
+
+    def _ours(self, changed: Iterable[RosParameter]) -> dict[str, Any]:
+        return {p.name: p.value for p in changed if p.name in self._known}
+
+
+def _descriptor(item: Parameter) -> ParameterDescriptor:
+    descriptor = ParameterDescriptor(
+        name=item.name,
+        description=item.doc,
+        read_only=not item.run_time,
+        # A whole number where a decimal is meant, or one value for a list, is checked by us.
+        dynamic_typing=item.kind is float or item.is_list,
+    )
+    if item.choices:
+        descriptor.additional_constraints = "one of: " + ", ".join(map(str, item.choices))
+    elif not item.is_list and item.kind is int and not math.isinf(item.low):
+        high = int(item.high) if not math.isinf(item.high) else 2**31 - 1
+        descriptor.integer_range = [IntegerRange(from_value=int(item.low), to_value=high, step=0)]
+    elif not item.is_list and item.kind is float and not math.isinf(item.low):
+        high_value = item.high if not math.isinf(item.high) else 1e308
+        descriptor.floating_point_range = [
+            FloatingPointRange(from_value=item.low, to_value=high_value, step=0.0)
+        ]
+    return descriptor

@@ -1,0 +1,77 @@
+"""Runs one node as a process: checks its files first, stops it in order on SIGINT and SIGTERM."""
+
+from __future__ import annotations
+
+import signal
+import sys
+import threading
+from collections.abc import Callable, Sequence
+from types import FrameType
+from typing import Protocol
+
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+
+from snake_control.config import load
+from snake_control.errors import SnakeError
+
+EXIT_BAD_CONFIG = 2
+EXIT_FAILED = 1
+
+
+class Runnable(Protocol):
+    """What a node offers to ``run`` beyond rclpy's own methods."""
+
+    def close(self) -> None:
+        """Bring the hardware to rest and release it; ROS still works at this time."""
+
+
+def parameter_files(arguments: Sequence[str]) -> list[str]:
+    """Return the files given with ``--params-file``, in order."""
+    return [
+        arguments[i + 1]
+        for i, argument in enumerate(arguments[:-1])
+        if argument == "--params-file"
+    ]
+
+
+def run(make_node: Callable[[], Node], arguments: Sequence[str] | None = None) -> int:
+    """Make a node, spin it until a signal or a shutdown, close it; return the exit code.
+
+    Files are validated before rcl reads them, because rcl aborts on some mistakes without saying
+    which field is wrong.
+    """
+    arguments = list(sys.argv if arguments is None else arguments)
+    stop = threading.Event()
+
+    def on_signal(_number: int, _frame: FrameType | None) -> None:
+        stop.set()
+
+    signal.signal(signal.SIGINT, on_signal)
+    signal.signal(signal.SIGTERM, on_signal)
+    try:
+        load(*parameter_files(arguments))
+    except SnakeError as error:
+        print(f"configuration error: {error}", file=sys.stderr)
+        return EXIT_BAD_CONFIG
+
+    # rclpy's own handlers would shut the context down before the node can close in order.
+    rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
+    node: Node | None = None
+    try:
+        node = make_node()
+        executor = SingleThreadedExecutor()
+        executor.add_node(node)
+        while rclpy.ok() and not stop.is_set():
+            executor.spin_once(timeout_sec=0.1)
+        return 0
+    except SnakeError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return EXIT_FAILED
+    finally:
+        if node is not None:
+            node.close()  # type: ignore[attr-defined]
+            node.destroy_node()
+        rclpy.try_shutdown()
