@@ -1,1 +1,1 @@
-""""""
+"""The robot's mathematics: geometry, velocity constraints, redundancy, stability."""

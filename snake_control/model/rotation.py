@@ -1,0 +1,86 @@
+"""Rotations in the paper's roll-pitch-yaw convention: Rz(Y) Ry(P) Rx(R), P > 0 is nose down."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial.transform import Rotation
+
+Array = NDArray[np.float64]
+
+
+def rotation_from_rpy(rpy: ArrayLike) -> Array:
+    """Return the rotation matrix of [R, P, Y].
+
+    Args:
+        rpy: roll, pitch, yaw [rad], shape (3,).
+
+    Returns:
+        Rz(Y) Ry(P) Rx(R), shape (3, 3): columns are the body axes in the world.
+    """
+    roll, pitch, yaw = (float(angle) for angle in np.asarray(rpy, dtype=float))
+    cr, sr = math.cos(roll), math.sin(roll)
+    cp, sp = math.cos(pitch), math.sin(pitch)
+    cy, sy = math.cos(yaw), math.sin(yaw)
+    return np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )
+
+
+def rpy_from_rotation(rotation: ArrayLike) -> Array:
+    """Return [R, P, Y] of a rotation matrix, P in [-pi/2, pi/2], shape (3,) [rad].
+
+    At P = +-pi/2 roll and yaw are one and the same rotation; roll is then 0.
+    """
+    m = np.asarray(rotation, dtype=float)
+    horizontal = math.hypot(m[0, 0], m[1, 0])
+    pitch = math.atan2(-m[2, 0], horizontal)
+    if horizontal < 1e-12:
+        return np.array([0.0, pitch, math.atan2(-m[0, 1], m[1, 1])])
+    return np.array([math.atan2(m[2, 1], m[2, 2]), pitch, math.atan2(m[1, 0], m[0, 0])])
+
+
+def rpy_rate_map(rpy: ArrayLike) -> Array:
+    """Return the map from rates of [R, P, Y] to angular velocity in the world.
+
+    Args:
+        rpy: roll, pitch, yaw [rad], shape (3,).
+
+    Returns:
+        Shape (3, 3); singular at P = +-pi/2, where no inverse exists.
+    """
+    _, pitch, yaw = (float(angle) for angle in np.asarray(rpy, dtype=float))
+    cp, sp = math.cos(pitch), math.sin(pitch)
+    cy, sy = math.cos(yaw), math.sin(yaw)
+    return np.array([[cy * cp, -sy, 0.0], [sy * cp, cy, 0.0], [-sp, 0.0, 1.0]])
+
+
+def quaternion_from_rpy(rpy: ArrayLike) -> Array:
+    """Return the quaternion [x, y, z, w] of [R, P, Y]."""
+    return Rotation.from_matrix(rotation_from_rpy(rpy)).as_quat()
+
+
+def rpy_from_quaternion(quaternion: ArrayLike) -> Array:
+    """Return [R, P, Y] of a quaternion [x, y, z, w] of any length but zero.
+
+    Raises:
+        ValueError: the quaternion has no length.
+    """
+    return rpy_from_rotation(Rotation.from_quat(np.asarray(quaternion, dtype=float)).as_matrix())
+
+
+def wrap(angle: ArrayLike) -> Array:
+    """Return angles in [-pi, pi), elementwise [rad]."""
+    return np.mod(np.asarray(angle, dtype=float) + math.pi, 2 * math.pi) - math.pi
+
+
+def unwrap_near(rpy: ArrayLike, previous: ArrayLike) -> Array:
+    """Return ``rpy`` with whole turns added so that it lies next to ``previous`` [rad]."""
+    previous = np.asarray(previous, dtype=float)
+    return previous + wrap(np.asarray(rpy, dtype=float) - previous)
