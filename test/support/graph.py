@@ -1,0 +1,235 @@
+"""A ROS graph of its own for one test: node processes, recorders, publishers, service calls.
+
+    with Graph() as graph:
+        controller = graph.start("scp_controller", params_files=[PAPER_ROBOT])
+        states = graph.subscribe(CONTROLLER_STATE)
+        graph.wait_for(lambda: states.messages, 20.0, "the first controller_state")
+"""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+import random
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import IO, Any, TypeVar
+
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.publisher import Publisher
+from rclpy.signals import SignalHandlerOptions
+from support.process import Process
+
+ROOT = Path(__file__).resolve().parents[2]
+CONFIG = ROOT / "config"
+
+_Result = TypeVar("_Result")
+
+
+class Recorder:
+    """Keeps every message of one topic, oldest first."""
+
+    def __init__(self, changed: threading.Condition) -> None:
+        self._changed = changed
+        self._messages: list[Any] = []
+
+    @property
+    def messages(self) -> list[Any]:
+        """A copy of the messages received so far."""
+        return list(self._messages)
+
+    @property
+    def last(self) -> Any:
+        """The newest message, ``None`` before the first."""
+        return self._messages[-1] if self._messages else None
+
+    def clear(self) -> None:
+        """Forget the messages received so far."""
+        self._messages.clear()
+
+    def _take(self, message: Any) -> None:
+        self._messages.append(message)
+        with self._changed:
+            self._changed.notify_all()
+
+
+class Graph:
+    """Context manager around a ROS domain that nothing else on this machine uses.
+
+    Attributes:
+        node: a node of the test itself, spinning in a thread of its own.
+        domain_id: ROS_DOMAIN_ID of this graph.
+        environment: environment of the child processes.
+    """
+
+    def __enter__(self) -> Graph:
+        self._directory = tempfile.TemporaryDirectory(prefix="snake_control_graph_")
+        self.domain_id, self._lock = _reserve_domain()
+        ours = {
+            "ROS_DOMAIN_ID": str(self.domain_id),
+            "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+            "ROS_LOG_DIR": self._directory.name,
+            "RCUTILS_COLORIZED_OUTPUT": "0",
+            "PYTHONUNBUFFERED": "1",
+        }
+        self.environment = os.environ | ours
+        self._processes: list[Process] = []
+        self._changed = threading.Condition()
+        self._stop = threading.Event()
+        self._failure: BaseException | None = None
+        # rcl reads these from the environment of the process while it initialises a context.
+        before = {name: os.environ.get(name) for name in ours}
+        os.environ.update(ours)
+        try:
+            self._context = rclpy.Context()
+            rclpy.init(
+                context=self._context,
+                domain_id=self.domain_id,
+                signal_handler_options=SignalHandlerOptions.NO,
+            )
+            self.node = rclpy.create_node("test_of_the_graph", context=self._context)
+        finally:
+            for name, value in before.items():
+                if value is None:
+                    del os.environ[name]
+                else:
+                    os.environ[name] = value
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self.node)
+        self._thread = threading.Thread(target=self._spin, name="graph", daemon=True)
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for process in self._processes:
+            process.terminate()
+        deadline = time.monotonic() + 10.0
+        for process in self._processes:
+            try:
+                process.wait(max(0.1, deadline - time.monotonic()))
+            except AssertionError:
+                process.kill()
+                process.wait()
+        self._stop.set()
+        self._executor.wake()
+        self._thread.join()
+        self._executor.shutdown()
+        self.node.destroy_node()
+        self._context.try_shutdown()
+        self._directory.cleanup()
+        self._lock.close()
+
+    def start(
+        self,
+        kind: str,
+        *,
+        params_files: Sequence[str | Path] = (),
+        params: Mapping[str, Any] | None = None,
+        arguments: Sequence[str] = (),
+    ) -> Process:
+        """Start the node ``snake_control.nodes.<kind>`` as a process.
+
+        Args:
+            kind: ``bus_driver``, ``scp_controller``, ...
+            params_files: given as ``--params-file``, in this order.
+            params: single parameters, given as ``-p name:=value`` after the files.
+            arguments: further ROS arguments, such as ``["-r", "__node:=other"]``.
+        """
+        ros = ["--ros-args"]
+        for path in params_files:
+            ros += ["--params-file", str(path)]
+        for name, value in (params or {}).items():
+            # JSON is YAML as rcl reads it.
+            ros += ["-p", f"{name}:={json.dumps(value)}"]
+        ros += arguments
+        return self.run(f"snake_control.nodes.{kind}", ros, name=kind)
+
+    def run(self, module: str, arguments: Sequence[str], name: str | None = None) -> Process:
+        """Start any module of this project as a process inside this graph's domain."""
+        name = name or module
+        process = Process(
+            name,
+            [sys.executable, "-m", module, *arguments],
+            log=Path(self._directory.name) / f"{len(self._processes)}_{name}.txt",
+            cwd=ROOT,
+            environment=self.environment,
+        )
+        self._processes.append(process)
+        return process
+
+    def subscribe(self, topic: Any) -> Recorder:
+        """Record a topic (of ``snake_control.nodes.topics``) from now on."""
+        recorder = Recorder(self._changed)
+        self.node.create_subscription(topic.type, topic.name, recorder._take, topic.qos)
+        self._executor.wake()
+        return recorder
+
+    def publisher(self, topic: Any, wait: bool = False) -> Publisher:
+        """A publisher on a topic; with ``wait`` somebody has subscribed when this returns."""
+        publisher = self.node.create_publisher(topic.type, topic.name, topic.qos)
+        if wait:
+            self.wait_for(
+                lambda: publisher.get_subscription_count() > 0, 30.0, f"a subscriber of {topic.name}"
+            )
+        return publisher
+
+    def call(self, node_name: str, service: Any, request: Any, timeout_s: float = 30.0) -> Any:
+        """Call a service (of ``snake_control.nodes.topics``) of a node and return the response."""
+        name = service.name.replace("~", f"/{node_name}", 1)
+        client = self.node.create_client(service.type, name)
+        deadline = time.monotonic() + timeout_s
+        self.wait_for(client.service_is_ready, timeout_s, f"service {name}")
+        future = client.call_async(request)
+        self.wait_for(future.done, max(1.0, deadline - time.monotonic()), f"a reply of {name}")
+        return future.result()
+
+    def wait_for(self, condition: Callable[[], _Result], timeout_s: float, what: str) -> _Result:
+        """Wait until ``condition()`` is true and return what it returned.
+
+        Raises:
+            AssertionError: it was not within ``timeout_s``; names ``what`` and shows the end of
+                every process's output.
+        """
+        deadline = time.monotonic() + timeout_s
+        while True:
+            if self._failure is not None:
+                raise AssertionError(f"{what}: the test's own node failed") from self._failure
+            result = condition()
+            if result:
+                return result
+            left = deadline - time.monotonic()
+            if left <= 0:
+                reports = "\n".join(process.report() for process in self._processes)
+                raise AssertionError(f"{what}: not within {timeout_s} s\n{reports}")
+            with self._changed:
+                self._changed.wait(min(0.02, left))
+
+    def _spin(self) -> None:
+        try:
+            while not self._stop.is_set():
+                self._executor.spin_once(timeout_sec=0.2)
+        except BaseException as failure:  # shown by wait_for in the thread of the test
+            self._failure = failure
+
+
+def _reserve_domain() -> tuple[int, IO[str]]:
+    """A random ROS_DOMAIN_ID and the lock that keeps other tests of this machine off it."""
+    for domain in random.SystemRandom().sample(range(1, 102), 101):
+        path = Path(tempfile.gettempdir()) / f"snake_control_domain_{domain}.lock"
+        try:
+            lock = path.open("w")
+        except OSError:
+            continue
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            lock.close()
+            continue
+        return domain, lock
+    raise RuntimeError("every ROS domain from 1 to 101 is in use")

@@ -1,0 +1,87 @@
+"""One node as a child process whose output is kept."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+
+class Process:
+    """A running child process; standard output and error go to one file.
+
+    Attributes:
+        name: what it is, for messages.
+        pid: its process id.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        command: Sequence[str],
+        *,
+        log: Path,
+        cwd: Path,
+        environment: Mapping[str, str],
+    ) -> None:
+        self.name = name
+        self._log = log
+        with log.open("wb") as stream:
+            self._popen = subprocess.Popen(
+                list(command),
+                stdin=subprocess.DEVNULL,
+                stdout=stream,
+                stderr=subprocess.STDOUT,
+                cwd=cwd,
+                env=dict(environment),
+            )
+        self.pid = self._popen.pid
+
+    @property
+    def running(self) -> bool:
+        """Whether it has not ended yet."""
+        return self._popen.poll() is None
+
+    @property
+    def exit_code(self) -> int | None:
+        """Exit code, negative for a signal, ``None`` while it runs."""
+        return self._popen.poll()
+
+    def output(self) -> str:
+        """Everything it printed so far."""
+        return self._log.read_text(encoding="utf-8", errors="replace")
+
+    def interrupt(self) -> None:
+        """Send SIGINT, as Ctrl-C does."""
+        self._send(signal.SIGINT)
+
+    def terminate(self) -> None:
+        """Send SIGTERM."""
+        self._send(signal.SIGTERM)
+
+    def kill(self) -> None:
+        """Send SIGKILL: it gets no chance to clean up."""
+        self._send(signal.SIGKILL)
+
+    def wait(self, timeout: float = 10.0) -> int:
+        """Wait until it has ended and return its exit code.
+
+        Raises:
+            AssertionError: it still runs after ``timeout`` seconds; shows what it printed.
+        """
+        try:
+            return self._popen.wait(timeout)
+        except subprocess.TimeoutExpired:
+            raise AssertionError(f"did not end within {timeout} s\n{self.report()}") from None
+
+    def report(self, lines: int = 40) -> str:
+        """The end of its output under a headline with its state."""
+        state = "running" if self.running else f"exit code {self.exit_code}"
+        tail = "\n".join(self.output().splitlines()[-lines:])
+        return f"--- {self.name} (pid {self.pid}, {state})\n{tail}"
+
+    def _send(self, number: signal.Signals) -> None:
+        if self.running:
+            os.kill(self.pid, number)
