@@ -1,0 +1,74 @@
+SHELL := /bin/bash
+.SHELLFLAGS := -eu -o pipefail -c
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+.NOTPARALLEL:
+MAKEFLAGS += --no-print-directory
+
+CASE ?= 3
+DURATION ?= 60
+SEED ?= 1
+PYTHON ?=
+export PYTHON
+
+.PHONY: help demo test lint bench clean setup build FORCE
+
+help:
+	@printf '%s\n' \
+	  'make demo    the paper'"'"'s experiment on a mock robot through real ROS 2 messages; results in out/demo' \
+	  '             CASE=1|2|3 (default 3)  DURATION=seconds (default 60)  SEED=n (default 1)' \
+	  'make test    lint, then all tests' \
+	  'make lint    style, types and the import rules' \
+	  'make bench   measure the time of a control step and of the bus' \
+	  'make clean   remove all that the others made' \
+	  '' \
+	  'Each does the set-up that it needs, once: packages in .venv, messages in install.' \
+	  'PYTHON=path chooses the Python (3.11, 3.12 or 3.13). Where ROS 2 Jazzy is sourced, it is used.' \
+	  'For a shell with all of it:  source scripts/env.sh  (then colcon build, colcon test, python -m ...)'
+
+ifneq ($(filter-out help clean,$(MAKECMDGOALS)),)
+WORLD := $(shell bash scripts/world.sh)
+ifeq ($(WORLD),)
+$(error no usable ROS 2, see above)
+endif
+# Another ROS, another folder or another PYTHON than last time: set up again.
+ifneq ($(WORLD) $(CURDIR) $(or $(PYTHON),any),$(shell cat .venv/world 2>/dev/null) $(if $(PYTHON),$(shell cat .venv/python 2>/dev/null),any))
+.venv/ready: FORCE
+endif
+endif
+
+.venv/ready: requirements/runtime.txt requirements/dev.txt requirements/ros.txt \
+             scripts/setup.sh scripts/localise_cmake.py
+	@bash scripts/setup.sh $(WORLD)
+	@touch $@
+
+INTERFACES := $(wildcard snake_interfaces/*.* snake_interfaces/*/*)
+PACKAGE := package.xml setup.py setup.cfg colcon_defaults.yaml \
+           $(wildcard config/*.yaml launch/*.py resource/*) \
+           $(shell find snake_control -name '*.py')
+
+build/ready: .venv/ready $(INTERFACES) $(PACKAGE)
+	@bash scripts/build.sh
+	@touch $@
+
+setup: .venv/ready
+
+build: build/ready
+
+demo: build/ready
+	@. scripts/env.sh && exec python -m snake_control.cli.demo \
+	  --case $(CASE) --duration $(DURATION) --seed $(SEED) --out out/demo
+
+test: lint build/ready
+	@. scripts/env.sh && python -m pytest
+
+lint: .venv/ready
+	@. scripts/env.sh && bash scripts/lint.sh
+
+bench: build/ready
+	@. scripts/env.sh && python -m benchmarks.run
+
+clean:
+	rm -rf .venv build install log out .pytest_cache .ruff_cache .mypy_cache \
+	  .import_linter_cache .hypothesis
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
