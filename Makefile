@@ -1,5 +1,6 @@
 SHELL := /bin/bash
-.SHELLFLAGS := -eu -o pipefail -c
+# Not -u: the scripts that colcon makes read unset variables.
+.SHELLFLAGS := -e -o pipefail -c
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .NOTPARALLEL:
@@ -63,7 +64,7 @@ test: lint build/ready
 	@. scripts/env.sh && python -m pytest
 
 lint: .venv/ready
-	@. scripts/env.sh && bash scripts/lint.sh
+	@bash scripts/lint.sh
 
 bench: build/ready
 	@. scripts/env.sh && python -m benchmarks.run

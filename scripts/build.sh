@@ -1,8 +1,7 @@
 #!/usr/bin/env bash
 # Builds both packages into install/.
-set -eu
+set -e
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
-# Without what an earlier build installed, which is about to be replaced.
 . scripts/env.sh
 python=$PWD/.venv/bin/python
 [ "$(bash scripts/world.sh)" = wheels ] || python=$(command -v python3)
