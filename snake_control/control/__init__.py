@@ -1,1 +1,1 @@
-""""""
+"""Controllers: from a head reference to joint velocities."""

@@ -1,1 +1,1 @@
-""""""
+"""What the joints move: the body on the floor."""

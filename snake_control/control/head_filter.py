@@ -1,0 +1,184 @@
+"""Filters the measured head pose: position, attitude and their rates, without lag at constant velocity.
+
+Per axis it is a critically damped g-h (alpha-beta) filter: both poles at
+``theta = exp(-omega_0 dt)``, hence ``g = 1 - theta^2`` and ``h = (1 - theta)^2``, with ``dt`` the
+difference of two stamps. The measured position passes to the estimate as
+``(2 omega_0 s + omega_0^2) / (s + omega_0)^2``, whose -3 dB frequency ``cutoff_hz`` fixes
+``omega_0``. A constant velocity is followed without a steady error; a constant acceleration ``a``
+leaves about ``a / omega_0^2``.
+
+The attitude is filtered the same way: the error is the rotation vector, in the world, from
+predicted to measured attitude, and the rate is the angular velocity in the world.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import enum
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial.transform import Rotation
+
+Array = NDArray[np.float64]
+
+QUATERNION_TOLERANCE = 0.01
+"""How far the length of a measured quaternion may be from 1."""
+
+# |H|^2 = 1/2 at (omega / omega_0)^2 = 3 + sqrt(10).
+_CUTOFF_OVER_OMEGA_0 = math.sqrt(3.0 + math.sqrt(10.0))
+
+
+class Reason(enum.Enum):
+    """Why a measured pose was not used."""
+
+    NOT_FINITE = "not finite"
+    NOT_A_ROTATION = "its quaternion is not of length 1"
+    OUT_OF_ORDER = "not newer than the pose before"
+
+
+@dataclasses.dataclass(frozen=True)
+class Rejection:
+    """A measured pose that was not used.
+
+    Attributes:
+        reason: what kind of fault.
+        text: the reason in words, with the value.
+    """
+
+    reason: Reason
+    text: str
+
+
+@dataclasses.dataclass(frozen=True)
+class HeadEstimate:
+    """Filtered motion of the head at one time.
+
+    Attributes:
+        stamp_ns: time of capture of the pose that was used last [ns].
+        position: of the tip in the world, shape (3,) [m].
+        rotation: attitude of the head in the world.
+        velocity: of the tip in the world, shape (3,) [m/s].
+        angular_velocity: of the head, in the world, shape (3,) [rad/s].
+    """
+
+    stamp_ns: int
+    position: Array
+    rotation: Rotation
+    velocity: Array
+    angular_velocity: Array
+
+
+@dataclasses.dataclass(frozen=True)
+class NoiseGain:
+    """Standard deviations of the estimate per standard deviation of white measurement noise.
+
+    Attributes:
+        pose: of position (or attitude), without unit.
+        rate: of velocity (or angular velocity) [1/s].
+    """
+
+    pose: float
+    rate: float
+
+
+def gains(cutoff_hz: float, dt: float) -> tuple[float, float]:
+    """Return g and h of the filter for one step.
+
+    Args:
+        cutoff_hz: -3 dB frequency from measured to estimated position.
+        dt: time since the measurement before [s], above 0.
+    """
+    omega_0 = 2 * math.pi * cutoff_hz / _CUTOFF_OVER_OMEGA_0
+    # expm1 keeps g and h exact for steps much shorter than the filter's memory.
+    return -math.expm1(-2 * omega_0 * dt), math.expm1(-omega_0 * dt) ** 2
+
+
+def noise_gain(cutoff_hz: float, rate_hz: float) -> NoiseGain:
+    """Return how much of white measurement noise is left in the estimate.
+
+    For poses at ``rate_hz``: with ``d = g (4 - 2 g - h)`` and ``T = 1 / rate_hz`` the variances are
+    multiplied by ``(2 g^2 + 2 h - 3 g h) / d`` and ``2 h^2 / (T^2 d)``. With 3 Hz and 100 poses per
+    second: 0.30 and 1.05 1/s, so 0.5 mm of noise leaves 0.15 mm and 0.5 mm/s.
+    """
+    dt = 1.0 / rate_hz
+    g, h = gains(cutoff_hz, dt)
+    denominator = g * (4 - 2 * g - h)
+    return NoiseGain(
+        pose=math.sqrt((2 * g * g + 2 * h - 3 * g * h) / denominator),
+        rate=math.sqrt(2 * h * h / denominator) / dt,
+    )
+
+
+class HeadFilter:
+    """Estimates pose and velocity of the head from stamped, noisy, possibly faulty poses."""
+
+    def __init__(self, cutoff_hz: float, timeout_s: float) -> None:
+        """Create the filter without an estimate.
+
+        Args:
+            cutoff_hz: -3 dB frequency from measured to estimated position.
+            timeout_s: after a gap longer than this the motion before it says nothing any more:
+                the estimate starts anew from the next pose, at rest.
+        """
+        self._cutoff_hz = cutoff_hz
+        self._timeout_ns = round(timeout_s * 1e9)
+        self._estimate: HeadEstimate | None = None
+
+    @property
+    def estimate(self) -> HeadEstimate | None:
+        """The newest estimate, ``None`` before the first good pose."""
+        return self._estimate
+
+    def reset(self) -> None:
+        """Forget everything, for a clock that was set back."""
+        self._estimate = None
+
+    def update(
+        self, stamp_ns: int, position: ArrayLike, quaternion: ArrayLike
+    ) -> HeadEstimate | Rejection:
+        """Take one measured pose.
+
+        Args:
+            stamp_ns: time of capture [ns].
+            position: of the tip in the world, shape (3,) [m].
+            quaternion: attitude of the head in the world, [x, y, z, w].
+
+        Returns:
+            The estimate at ``stamp_ns``, or why the pose was not used (the estimate then stays).
+        """
+        z = np.asarray(position, dtype=float)
+        xyzw = np.asarray(quaternion, dtype=float)
+        if not (np.isfinite(z).all() and np.isfinite(xyzw).all()):
+            return Rejection(
+                Reason.NOT_FINITE, f"pose is not finite: position {z}, quaternion {xyzw}"
+            )
+        norm = float(np.linalg.norm(xyzw))
+        if abs(norm - 1.0) > QUATERNION_TOLERANCE:
+            return Rejection(
+                Reason.NOT_A_ROTATION, f"quaternion has length {norm:.3g}, it must be 1"
+            )
+        measured = Rotation.from_quat(xyzw)
+        before = self._estimate
+        if before is None or stamp_ns - before.stamp_ns > self._timeout_ns:
+            self._estimate = HeadEstimate(stamp_ns, z.copy(), measured, np.zeros(3), np.zeros(3))
+            return self._estimate
+        dt = (stamp_ns - before.stamp_ns) * 1e-9
+        if dt <= 0:
+            return Rejection(
+                Reason.OUT_OF_ORDER, f"pose was captured {-dt:.4f} s before the one before it"
+            )
+        g, h = gains(self._cutoff_hz, dt)
+        predicted = before.position + before.velocity * dt
+        residual = z - predicted
+        predicted_rotation = Rotation.from_rotvec(before.angular_velocity * dt) * before.rotation
+        rotation_residual = (measured * predicted_rotation.inv()).as_rotvec()
+        self._estimate = HeadEstimate(
+            stamp_ns=stamp_ns,
+            position=predicted + g * residual,
+            rotation=Rotation.from_rotvec(g * rotation_residual) * predicted_rotation,
+            velocity=before.velocity + h / dt * residual,
+            angular_velocity=before.angular_velocity + h / dt * rotation_residual,
+        )
+        return self._estimate

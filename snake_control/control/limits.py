@@ -1,0 +1,69 @@
+"""Joint speed and joint range limits on a whole velocity vector."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snake_control.config import RobotConfig
+
+Array = NDArray[np.float64]
+
+# Two ticks of an AX-12: a goal at the end of the range may be read back this far inside it.
+RANGE_MARGIN_RAD = 0.0103
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Limited:
+    """A velocity vector within limits, and what had to be done to it.
+
+    Attributes:
+        u: joint velocities, (n-1,) [rad/s].
+        speed_scale: factor the whole vector was scaled down with, 0..1.
+        speed_limited: joints whose speed limit set that factor, counted from 1.
+        range_limited: joints at an end of their range that lost an outward velocity, from 1.
+    """
+
+    u: Array
+    speed_scale: float
+    speed_limited: tuple[int, ...]
+    range_limited: tuple[int, ...]
+
+
+class JointLimits:
+    """The limits of one robot."""
+
+    def __init__(self, robot: RobotConfig) -> None:
+        self._speed = np.array(robot.joint_speed_limits_rad_s)
+        bounds = np.array(robot.joint_limits_rad).reshape(-1, 2)
+        self._lower, self._upper = bounds[:, 0], bounds[:, 1]
+
+    def apply(self, phi: Array, u: Array) -> Limited:
+        """Limit joint velocities.
+
+        A joint at the end of its range gets no velocity outwards (its wheels then slip). Then the
+        whole vector is scaled, never a single joint: all wheel constraints are linear in the
+        joint velocities and stay fulfilled.
+
+        Args:
+            phi: joint angles, (n-1,) [rad].
+            u: wanted joint velocities, finite, (n-1,) [rad/s].
+        """
+        outward = ((phi >= self._upper - RANGE_MARGIN_RAD) & (u > 0)) | (
+            (phi <= self._lower + RANGE_MARGIN_RAD) & (u < 0)
+        )
+        u = np.where(outward, 0.0, u)
+        excess = np.abs(u) / self._speed
+        worst = float(excess.max())
+        scale = 1.0 if worst <= 1.0 else 1.0 / worst
+        limiting = np.flatnonzero(excess > 1.0) if scale < 1.0 else np.array([], dtype=int)
+        # Only the joint that is furthest beyond its limit determines the scale.
+        limiting = limiting[excess[limiting] >= worst]
+        return Limited(
+            u=u * scale,
+            speed_scale=scale,
+            speed_limited=tuple(int(j) + 1 for j in limiting),
+            range_limited=tuple(int(j) + 1 for j in np.flatnonzero(outward)),
+        )

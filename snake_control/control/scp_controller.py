@@ -1,0 +1,129 @@
+"""The velocity controller (22) with sub-tasks by shape controllable points (25), (27)."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from snake_control.config import ControllerConfig, RobotConfig
+from snake_control.control.limits import JointLimits
+from snake_control.control.reference import Reference
+from snake_control.control.sub_tasks import base_scp_velocities, costs, head_scp_velocities
+from snake_control.errors import SingularError
+from snake_control.model.geometry import geometry
+from snake_control.model.redundancy import joint_velocities, kinematics
+from snake_control.model.rotation import wrap
+
+Array = NDArray[np.float64]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class ControlResult:
+    """One control step: the command and everything that led to it.
+
+    Attributes:
+        w, w_d, w_d_dot: head pose, wanted pose and its rate, (6,) [m, rad, m/s, rad/s].
+        error: w - w_d with angles in [-pi, pi), (6,).
+        phi: joint angles, (n-1,) [rad].
+        phi_tilde_dot_d: wanted SCP velocities, H-SCPs first (25), (27), (m,) [rad/s].
+        u_unlimited, u: joint velocities (22) before and after limiting, (n-1,) [rad/s].
+        speed_scale: factor by which the whole vector was scaled down, 0..1.
+        speed_limited, range_limited: joints whose limits bit, counted from 1.
+        V_h, V_b1, d_min: cost functions (29), (30).
+        sigma_min_B_tilde, sigma_min_A_hat: smallest singular values of (7), (11).
+        support_polygon: corners, counter-clockwise, (k, 2) [m].
+        center_of_mass: P_G, (2,) [m].
+    """
+
+    w: Array
+    w_d: Array
+    w_d_dot: Array
+    error: Array
+    phi: Array
+    phi_tilde_dot_d: Array
+    u_unlimited: Array
+    u: Array
+    speed_scale: float
+    speed_limited: tuple[int, ...]
+    range_limited: tuple[int, ...]
+    V_h: float
+    V_b1: float
+    d_min: float
+    sigma_min_B_tilde: float
+    sigma_min_A_hat: float
+    support_polygon: Array
+    center_of_mass: Array
+
+
+class ScpController:
+    """Moves the head along a reference and spends the redundancy on sub-tasks.
+
+    It keeps no state between steps: the same posture and reference give the same command.
+    """
+
+    def __init__(self, robot: RobotConfig, controller: ControllerConfig) -> None:
+        """Prepare a controller.
+
+        Args:
+            robot: the robot.
+            controller: gains; K is the diagonal for the head (its SCP part is 0).
+        """
+        self._robot = robot
+        self._gains = controller
+        self._K = np.array(controller.K[:6])
+        self._limits = JointLimits(robot)
+
+    def step(
+        self, q: ArrayLike, q_dot: ArrayLike | None, reference: Reference, t: float
+    ) -> ControlResult:
+        """Return joint velocities for one moment.
+
+        Args:
+            q: [w, phi], (n+5,) [m, rad].
+            q_dot: its rate; the velocity controller does not use it.
+            reference: wanted head pose and rate.
+            t: time [s]; the velocity controller does not use it.
+
+        Raises:
+            ModelError: q has the wrong shape or is not finite.
+            SingularError: B_tilde has no inverse, or the answer is not finite.
+        """
+        del q_dot, t
+        g = geometry(self._robot, q)
+        k = kinematics(g)
+        cost = costs(g, k)
+        w, phi = g.q[:6], g.q[6:]
+        error = w - reference.w_d
+        error[3:] = wrap(error[3:])
+        phi_tilde_dot_d = np.concatenate(
+            (
+                head_scp_velocities(k, cost, self._gains),
+                base_scp_velocities(k, cost, self._gains),
+            )
+        )
+        u = joint_velocities(k, reference.w_d_dot - self._K * error, phi_tilde_dot_d)
+        if not np.isfinite(u).all():
+            raise SingularError("B_tilde", k.sigma_min_B_tilde)
+        limited = self._limits.apply(phi, u)
+        return ControlResult(
+            w=w,
+            w_d=reference.w_d,
+            w_d_dot=reference.w_d_dot,
+            error=error,
+            phi=phi,
+            phi_tilde_dot_d=phi_tilde_dot_d,
+            u_unlimited=u,
+            u=limited.u,
+            speed_scale=limited.speed_scale,
+            speed_limited=limited.speed_limited,
+            range_limited=limited.range_limited,
+            V_h=cost.V_h,
+            V_b1=cost.V_b1,
+            d_min=cost.support.d_min,
+            sigma_min_B_tilde=k.sigma_min_B_tilde,
+            sigma_min_A_hat=k.sigma_min_A_hat,
+            support_polygon=cost.support.polygon,
+            center_of_mass=cost.support.center_of_mass,
+        )

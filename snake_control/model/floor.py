@@ -1,0 +1,58 @@
+"""The robot standing level on the floor: the head pose follows from base pose and joint angles."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from snake_control.config import RobotConfig
+from snake_control.model.geometry import Geometry, geometry, link_centers
+from snake_control.model.rotation import rotation_from_rpy, rpy_from_rotation
+
+Array = NDArray[np.float64]
+
+GRAVITY_M_S2 = 9.80665
+
+
+def head_pose_on_floor(robot: RobotConfig, phi: ArrayLike, base: ArrayLike) -> Array:
+    """Return the head pose w of a robot whose base stands level at wheel height.
+
+    Args:
+        robot: the robot.
+        phi: joint angles, (n-1,) [rad].
+        base: position and heading [x, y, yaw] of the front end of link n_h + 1, (3,) [m, rad].
+
+    Returns:
+        w = [x_h, y_h, z_h, R, P, Y], (6,) [m, rad].
+    """
+    x, y, yaw = np.asarray(base, dtype=float)
+    at_origin = geometry(robot, np.concatenate((np.zeros(6), np.asarray(phi, dtype=float))))
+    rotation = rotation_from_rpy((0.0, 0.0, yaw)) @ at_origin.base_rotation.T
+    tip = np.array([x, y, robot.wheel_radius_m]) - rotation @ at_origin.base_origin
+    return np.concatenate((tip, rpy_from_rotation(rotation)))
+
+
+def base_pose(g: Geometry) -> Array:
+    """Return [x, y, yaw] of the front end of link n_h + 1, (3,) [m, rad]."""
+    forward = g.base_rotation[:, 0]
+    return np.array([*g.base_origin[:2], math.atan2(forward[1], forward[0])])
+
+
+def gravity_efforts(g: Geometry) -> Array:
+    """Return the torque each joint applies to hold the robot still, (n-1,) [N m].
+
+    The derivative of the potential energy by each joint angle with the base held by the floor:
+    head joints carry the links in front of them; base joints turn about the vertical and carry
+    nothing.
+    """
+    n_h = g.s.n_h
+    masses = g.s.masses[:n_h]
+    in_front = np.cumsum(masses)
+    moment = np.cumsum(masses[:, None] * link_centers(g)[:n_h], axis=0)
+    arms = moment - in_front[:, None] * g.head_points[1:]
+    axes = g.head_axes
+    efforts = np.zeros(g.s.n - 1)
+    efforts[:n_h] = -GRAVITY_M_S2 * (axes[:, 0] * arms[:, 1] - axes[:, 1] * arms[:, 0])
+    return efforts

@@ -1,0 +1,98 @@
+"""The body as a kinematic chain on wheels: no inertia, joints move as told, wheels may slip."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from snake_control.config import RobotConfig
+from snake_control.errors import ModelError
+from snake_control.model.constraints import lateral_joint_map, lateral_map
+from snake_control.model.floor import gravity_efforts, head_pose_on_floor
+from snake_control.model.geometry import geometry
+from snake_control.model.stability import support
+from snake_control.model.structure import structure
+from snake_control.plant.plant import PlantState
+
+Array = NDArray[np.float64]
+
+
+class KinematicPlant:
+    """Base level on the floor; its planar velocity fulfils the wheel constraints at best.
+
+    The floor rows of (3) hold exactly because the base pose is integrated, not the head pose. The
+    wheel rows outnumber the three planar velocities: where the joint velocities disagree with
+    them, least squares decide, and what remains is the slip of each wheel.
+    """
+
+    def __init__(self, robot: RobotConfig) -> None:
+        """Make a plant; call ``reset`` or it starts at the robot's start posture."""
+        self._robot = robot
+        self._s = structure(robot)
+        self.reset(robot.start_joint_angles_rad)
+
+    def reset(self, phi: ArrayLike, w: ArrayLike | None = None) -> PlantState:
+        """Put the robot on the floor; see ``Plant.reset``."""
+        self._phi = self._checked("phi", phi).copy()
+        wanted = np.zeros(6) if w is None else np.asarray(w, dtype=float)
+        # Turn and shift a robot whose base stands at the origin to where the head shall be.
+        at_origin = head_pose_on_floor(self._robot, self._phi, np.zeros(3))
+        yaw = wanted[5] - at_origin[5]
+        c, s = math.cos(yaw), math.sin(yaw)
+        x = wanted[0] - (c * at_origin[0] - s * at_origin[1])
+        y = wanted[1] - (s * at_origin[0] + c * at_origin[1])
+        self._base = np.array([x, y, yaw])
+        self._fallen = False
+        return self._state(np.zeros(self._s.n - 1), np.zeros(len(self._s.wheeled)))
+
+    def step(self, joint_command: ArrayLike, dt: float) -> PlantState:
+        """Advance by ``dt`` seconds at constant joint velocities; see ``Plant.step``.
+
+        Raises:
+            ModelError: wrong shape or not finite.
+        """
+        phi_dot = self._checked("joint velocities", joint_command)
+        # Midpoint rule: second order, at the price of two small least-squares problems.
+        middle, _ = self._base_velocity(self._phi, self._base, phi_dot)
+        planar, slip = self._base_velocity(
+            self._phi + 0.5 * dt * phi_dot, self._base + 0.5 * dt * middle, phi_dot
+        )
+        self._base = self._base + dt * planar
+        self._phi = self._phi + dt * phi_dot
+        return self._state(phi_dot, slip)
+
+    def _base_velocity(self, phi: Array, base: Array, phi_dot: Array) -> tuple[Array, Array]:
+        """Return the rate of [x, y, yaw] of the base, and the slip of each wheeled link."""
+        s = self._s
+        g = geometry(self._robot, np.concatenate((np.zeros(6), phi)))
+        rows = lateral_map(g)
+        by_joints = lateral_joint_map(g) @ phi_dot[s.n_h :]
+        twist = np.linalg.lstsq(rows, -by_joints, rcond=1e-9)[0]
+        c, si = math.cos(base[2]), math.sin(base[2])
+        rate = np.array([c * twist[0] - si * twist[1], si * twist[0] + c * twist[1], twist[2]])
+        return rate, rows @ twist + by_joints
+
+    def _state(self, phi_dot: Array, slip: Array) -> PlantState:
+        w = head_pose_on_floor(self._robot, self._phi, self._base)
+        g = geometry(self._robot, np.concatenate((w, self._phi)))
+        d_min = support(g).d_min
+        self._fallen |= d_min < 0
+        return PlantState(
+            w=w,
+            phi=self._phi.copy(),
+            phi_dot=phi_dot.copy(),
+            effort=gravity_efforts(g),
+            slip=slip,
+            d_min=d_min,
+            fallen=self._fallen,
+        )
+
+    def _checked(self, what: str, values: ArrayLike) -> Array:
+        array = np.asarray(values, dtype=float)
+        if array.shape != (self._s.n - 1,) or not np.isfinite(array).all():
+            raise ModelError(f"{what}: expected {self._s.n - 1} finite numbers, got {array}")
+        return array
+
+
