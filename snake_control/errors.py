@@ -68,3 +68,15 @@ class ServoError(SnakeError, RuntimeError):
     def __init__(self, findings: list[str]) -> None:
         self.findings = list(findings)
         super().__init__("; ".join(findings))
+
+
+class SeriesFileError(SnakeError, ValueError):
+    """A recorded series that does not belong to this robot, or is damaged.
+
+    Attributes:
+        path: the file.
+    """
+
+    def __init__(self, path: str, reason: str) -> None:
+        self.path = path
+        super().__init__(f"{path}: {reason}")
