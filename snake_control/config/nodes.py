@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 
 from snake_control.config.parameter import parameter
+from snake_control.errors import ConfigError
 
 SDK_BAUD_RATES = (9600, 19200, 57600, 115200, 500000, 1000000)
 """Rates that an AX-12 can be set to and that dynamixel_sdk can open."""
@@ -104,6 +105,10 @@ class TrajectoryGeneratorConfig:
         0.0, "length of the line, 0 for endless; its end is held [s]", low=0.0
     )
     autostart: bool = parameter(False, "start as soon as the head pose is known")
+    head_timeout_s: float = parameter(
+        0.1, "a motion that starts where the head is needs a head pose this fresh [s]",
+        low=0.02, high=1.0,
+    )
     cmd_vel_timeout_s: float = parameter(
         0.5, "without cmd_vel this fresh the teleoperated head is brought to rest [s]",
         low=0.05, high=10.0,
@@ -120,6 +125,12 @@ class TrajectoryGeneratorConfig:
     max_angular_acceleration_rad_s2: float = parameter(
         1.0, "the same for its rotation [rad/s^2]", low=1e-3, high=100.0
     )
+
+    def __post_init__(self) -> None:
+        for name in ("start_pose", "velocity"):
+            values = getattr(self, name)
+            if len(values) != 6:
+                raise ConfigError(name, list(values), "give 6 numbers: x, y, z, R, P, Y")
 
 
 @dataclasses.dataclass(frozen=True)

@@ -64,8 +64,8 @@ class RobotConfig:
         (2.6,),
         "largest angle of each joint to both sides, or one for all; or lower and upper bound of "
         "each joint in turn (2 (n - 1) entries) [rad]",
-        low=-2 * math.pi,
-        high=2 * math.pi,
+        low=-100.0,
+        high=100.0,
     )
     joint_speed_limits_rad_s: tuple[float, ...] = parameter(
         (5.5,), "largest speed of each joint, or one for all [rad/s]", low=1e-3, high=100.0

@@ -14,18 +14,35 @@ from numpy.typing import ArrayLike, NDArray
 
 from snake_control.config import RobotConfig
 from snake_control.errors import ModelError
-from snake_control.model.rotation import rotation_from_rpy, rpy_rate_map
+from snake_control.model.rotation import cross, rotation_from_rpy, rpy_rate_map
 from snake_control.model.structure import Structure, structure
 
 Array = NDArray[np.float64]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Geometry:
-    """A posture, worked out once and read by every model quantity.
+class PlanarBase:
+    """The base part in the frame of its first link; depends on the base joints alone.
 
     Attributes:
         s: index sets of the robot.
+        x, y: directions of each base link, forward and left, in base coordinates, (n_b, 2).
+        centers: link centres of the base part in base coordinates, (n_b, 2).
+        hitches: where base joints n_h+1 .. n-1 turn, in base coordinates, (n_b - 1, 2).
+    """
+
+    s: Structure
+    x: Array
+    y: Array
+    centers: Array
+    hitches: Array
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Geometry(PlanarBase):
+    """A posture, worked out once and read by every model quantity.
+
+    Attributes:
         q: [w, phi], (n+5,).
         base_rotation: columns are the axes of the base frame in the world, (3, 3).
         base_origin: front end of link n_h + 1 in the world, (3,).
@@ -34,12 +51,8 @@ class Geometry:
         head_axes: axis of each head joint in the world, (n_h, 3).
         twists: how the base frame moves for each of [w, phi_1 .. phi_(n_h)]: linear velocity at its
             origin and angular velocity, in base coordinates, (6, 6 + n_h).
-        x, y: directions of each base link, forward and left, in base coordinates, (n_b, 2).
-        centers: link centres of the base part in base coordinates, (n_b, 2).
-        hitches: where base joints n_h+1 .. n-1 turn, in base coordinates, (n_b - 1, 2).
     """
 
-    s: Structure
     q: Array
     base_rotation: Array
     base_origin: Array
@@ -47,10 +60,6 @@ class Geometry:
     head_centers: Array
     head_axes: Array
     twists: Array
-    x: Array
-    y: Array
-    centers: Array
-    hitches: Array
 
     def to_world(self, points: Array) -> Array:
         """Return points given in base coordinates, (..., 2), in the world, (..., 3)."""
@@ -87,12 +96,13 @@ def geometry(robot: RobotConfig, q: ArrayLike) -> Geometry:
         rotation = rotation @ _joint_rotation(s.axes[joint], q[6 + joint])
     head_points, head_axes = np.array(points), np.array(axes)
 
-    heading = np.concatenate(([0.0], np.cumsum(q[6 + s.n_h :])))
-    x = np.stack((np.cos(heading), np.sin(heading)), axis=1)
-    y = np.stack((-x[:, 1], x[:, 0]), axis=1)
-    ends = -2 * half * np.cumsum(x, axis=0)
+    base = planar_base(s, q[6 + s.n_h :])
     return Geometry(
         s=s,
+        x=base.x,
+        y=base.y,
+        centers=base.centers,
+        hitches=base.hitches,
         q=q,
         base_rotation=rotation,
         base_origin=point,
@@ -100,11 +110,17 @@ def geometry(robot: RobotConfig, q: ArrayLike) -> Geometry:
         head_centers=np.array(centers),
         head_axes=head_axes,
         twists=_twists(q, rotation, head_points, head_axes),
-        x=x,
-        y=y,
-        centers=ends + half * x,
-        hitches=ends[:-1],
     )
+
+
+def planar_base(s: Structure, base_angles: Array) -> PlanarBase:
+    """Return the base part for the angles of joints n_h+1 .. n-1, (n_b - 1,) [rad]."""
+    half = s.robot.half_length_m
+    heading = np.concatenate(([0.0], np.cumsum(base_angles)))
+    x = np.stack((np.cos(heading), np.sin(heading)), axis=1)
+    y = np.stack((-x[:, 1], x[:, 0]), axis=1)
+    ends = -2 * half * np.cumsum(x, axis=0)
+    return PlanarBase(s=s, x=x, y=y, centers=ends + half * x, hitches=ends[:-1])
 
 
 def _joint_rotation(axis: Array, angle: float) -> Array:
@@ -115,11 +131,14 @@ def _joint_rotation(axis: Array, angle: float) -> Array:
 
 
 def _twists(q: Array, base_rotation: Array, points: Array, axes: Array) -> Array:
-    angular = np.vstack((np.zeros((3, 3)), rpy_rate_map(q[3:6]).T, axes))
+    turning = np.hstack((rpy_rate_map(q[3:6]), axes.T))
     # R, P, Y turn about the tip; joint i turns about the front end of link i + 1.
-    pivots = np.vstack((points[:1], points[:1], points[:1], points[1:]))
-    linear = np.vstack((np.eye(3), np.cross(angular[3:], points[-1] - pivots)))
-    return np.vstack(((linear @ base_rotation).T, (angular @ base_rotation).T))
+    pivots = points[[0, 0, 0, *range(1, len(points))]]
+    twists = np.zeros((6, 3 + turning.shape[1]))
+    twists[:3, :3] = base_rotation.T
+    twists[:3, 3:] = base_rotation.T @ cross(turning, (points[-1] - pivots).T)
+    twists[3:, 3:] = base_rotation.T @ turning
+    return twists
 
 
 def link_points(robot: RobotConfig, q: ArrayLike) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 
 import numpy as np
@@ -22,34 +23,47 @@ class Support:
             inside, negative once the robot tips.
         center_of_mass: P_G, the centre of mass seen from above, (2,) [m].
         polygon: corners of the support polygon, counter-clockwise, (k, 2) [m].
-        gradient: of d_min by q, (n + 5,). d_min is not smooth where the nearest edge changes: there
-            it is the gradient for the edge that comes first in ``polygon``.
     """
 
     d_min: float
     center_of_mass: Array
     polygon: Array
-    gradient: Array
+    _g: Geometry
+    _ends: tuple[int, int]
+    _share: float
+
+    @functools.cached_property
+    def gradient(self) -> Array:
+        """Gradient of d_min by q, (n + 5,).
+
+        d_min is not smooth where the nearest edge changes: there it is the gradient for the edge
+        that comes first in ``polygon``.
+        """
+        contacts = wheel_contacts(self._g).reshape(-1, 2)
+        first, second = self._ends
+        p, q = contacts[first], contacts[second]
+        edge = (q - p) / math.hypot(*(q - p))
+        # On an edge the normal is exact even at distance 0; beyond a corner it points to the corner.
+        if 0 < self._share < 1:
+            normal = np.array([-edge[1], edge[0]])
+        else:
+            nearest = (1 - self._share) * p + self._share * q
+            normal = (self.center_of_mass - nearest) / self.d_min
+        gradient: Array = normal @ (
+            _center_of_mass_jacobian(self._g)
+            - (1 - self._share) * _contact_jacobian(self._g, first)
+            - self._share * _contact_jacobian(self._g, second)
+        )
+        return gradient
 
 
 def support(g: Geometry) -> Support:
-    """Return support polygon, P_G, d_min and its gradient of one posture."""
+    """Return support polygon, P_G and d_min of one posture; the gradient only when asked for."""
     contacts = wheel_contacts(g).reshape(-1, 2)
     center_of_mass = g.s.masses @ link_centers(g)[:, :2] / g.s.masses.sum()
     hull = convex_hull(contacts)
     i, j, share, d_min = _nearest_edge(contacts[hull], center_of_mass)
-    p, q = contacts[hull[i]], contacts[hull[j]]
-    offset = center_of_mass - ((1 - share) * p + share * q)
-    edge = (q - p) / math.hypot(*(q - p))
-    inward = np.array([-edge[1], edge[0]])
-    # On an edge the normal is exact even at distance 0; beyond a corner it points to the corner.
-    normal = inward if 0 < share < 1 else offset / d_min
-    gradient = normal @ (
-        _center_of_mass_jacobian(g)
-        - (1 - share) * _contact_jacobian(g, hull[i])
-        - share * _contact_jacobian(g, hull[j])
-    )
-    return Support(d_min, center_of_mass, contacts[hull], gradient)
+    return Support(d_min, center_of_mass, contacts[hull], g, (hull[i], hull[j]), share)
 
 
 def convex_hull(points: Array) -> list[int]:

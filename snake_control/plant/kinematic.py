@@ -11,7 +11,7 @@ from snake_control.config import RobotConfig
 from snake_control.errors import ModelError
 from snake_control.model.constraints import lateral_joint_map, lateral_map
 from snake_control.model.floor import gravity_efforts, head_pose_on_floor
-from snake_control.model.geometry import geometry
+from snake_control.model.geometry import geometry, planar_base
 from snake_control.model.stability import support
 from snake_control.model.structure import structure
 from snake_control.plant.plant import PlantState
@@ -65,10 +65,10 @@ class KinematicPlant:
 
     def _base_velocity(self, phi: Array, base: Array, phi_dot: Array) -> tuple[Array, Array]:
         """Return the rate of [x, y, yaw] of the base, and the slip of each wheeled link."""
-        s = self._s
-        g = geometry(self._robot, np.concatenate((np.zeros(6), phi)))
-        rows = lateral_map(g)
-        by_joints = lateral_joint_map(g) @ phi_dot[s.n_h :]
+        n_h = self._s.n_h
+        links = planar_base(self._s, phi[n_h:])
+        rows = lateral_map(links)
+        by_joints = lateral_joint_map(links) @ phi_dot[n_h:]
         twist = np.linalg.lstsq(rows, -by_joints, rcond=1e-9)[0]
         c, si = math.cos(base[2]), math.sin(base[2])
         rate = np.array([c * twist[0] - si * twist[1], si * twist[0] + c * twist[1], twist[2]])
