@@ -1,4 +1,4 @@
-"""Filters the measured head pose: position, attitude and their rates, without lag at constant velocity.
+"""Filters the measured head pose; at constant velocity the estimate does not lag.
 
 Per axis it is a critically damped g-h (alpha-beta) filter: both poles at
 ``theta = exp(-omega_0 dt)``, hence ``g = 1 - theta^2`` and ``h = (1 - theta)^2``, with ``dt`` the

@@ -1,1 +1,1 @@
-""""""
+"""What the head shall do, in time."""

@@ -17,6 +17,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import IO, Any, TypeVar
 
@@ -24,6 +25,7 @@ import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.publisher import Publisher
 from rclpy.signals import SignalHandlerOptions
+
 from support.process import Process
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -82,7 +84,6 @@ class Graph:
         self._processes: list[Process] = []
         self._changed = threading.Condition()
         self._stop = threading.Event()
-        self._failure: BaseException | None = None
         # rcl reads these from the environment of the process while it initialises a context.
         before = {name: os.environ.get(name) for name in ours}
         os.environ.update(ours)
@@ -102,8 +103,8 @@ class Graph:
                     os.environ[name] = value
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
-        self._thread = threading.Thread(target=self._spin, name="graph", daemon=True)
-        self._thread.start()
+        self._threads = ThreadPoolExecutor(1, thread_name_prefix="graph")
+        self._spinning = self._threads.submit(self._spin)
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -118,7 +119,7 @@ class Graph:
                 process.wait()
         self._stop.set()
         self._executor.wake()
-        self._thread.join()
+        self._threads.shutdown()
         self._executor.shutdown()
         self.node.destroy_node()
         self._context.try_shutdown()
@@ -174,9 +175,8 @@ class Graph:
         """A publisher on a topic; with ``wait`` somebody has subscribed when this returns."""
         publisher = self.node.create_publisher(topic.type, topic.name, topic.qos)
         if wait:
-            self.wait_for(
-                lambda: publisher.get_subscription_count() > 0, 30.0, f"a subscriber of {topic.name}"
-            )
+            subscribers = publisher.get_subscription_count
+            self.wait_for(subscribers, 30.0, f"a subscriber of {topic.name}")
         return publisher
 
     def call(self, node_name: str, service: Any, request: Any, timeout_s: float = 30.0) -> Any:
@@ -198,8 +198,9 @@ class Graph:
         """
         deadline = time.monotonic() + timeout_s
         while True:
-            if self._failure is not None:
-                raise AssertionError(f"{what}: the test's own node failed") from self._failure
+            if self._spinning.done():
+                # Shows what a callback of the test raised.
+                self._spinning.result()
             result = condition()
             if result:
                 return result
@@ -211,11 +212,8 @@ class Graph:
                 self._changed.wait(min(0.02, left))
 
     def _spin(self) -> None:
-        try:
-            while not self._stop.is_set():
-                self._executor.spin_once(timeout_sec=0.2)
-        except BaseException as failure:  # shown by wait_for in the thread of the test
-            self._failure = failure
+        while not self._stop.is_set():
+            self._executor.spin_once(timeout_sec=0.2)
 
 
 def _reserve_domain() -> tuple[int, IO[str]]:
