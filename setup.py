@@ -18,6 +18,8 @@ setup(
         (f"share/{NAME}/launch", sorted(glob("launch/*.launch.py"))),
     ],
     install_requires=["setuptools"],
+    # Tells `colcon test` to run pytest.
+    extras_require={"test": ["pytest"]},
     zip_safe=True,
     maintainer="snake_control maintainers",
     maintainer_email="maintainers@snake-control.invalid",

@@ -28,7 +28,9 @@ NEEDED = {
 
 def main() -> int:
     """Return 1, with the packages to install on standard error, if something is missing."""
-    missing = [package for module, package in NEEDED.items() if not importlib.util.find_spec(module)]
+    missing = [
+        package for module, package in NEEDED.items() if not importlib.util.find_spec(module)
+    ]
     if missing:
         print(f"Missing; install: sudo apt install {' '.join(missing)}", file=sys.stderr)
     return 1 if missing else 0
