@@ -1,0 +1,115 @@
+"""Several servos on one wire: who answers, in what order, and when the bytes have passed."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+from snake_control.mock.protocol import InstructionPacket, Parser
+from snake_control.mock.servo import Servo
+
+BITS_PER_BYTE = 10
+"""On the wire: a start bit, eight data bits, a stop bit."""
+
+RATE_TOLERANCE = 0.03
+"""Relative difference of two baud rates at which a byte is still read; the AX-12's own 117647 for
+115200 is 2.1 % off."""
+
+GAP_S = 0.02
+"""A packet is given up when its next byte has not come for this long [s]."""
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class Reply:
+    """Bytes of a reply, and when the last of them has passed the wire.
+
+    Attributes:
+        at: time by the clock of ``Bus.receive`` [s].
+        data: the bytes.
+    """
+
+    at: float
+    data: bytes
+
+
+class Bus:
+    """A half-duplex wire with servos on it; reads no clock.
+
+    Attributes:
+        servos: all servos, also such that share an id.
+    """
+
+    def __init__(self, servos: Sequence[Servo], *, wire_time: bool = True) -> None:
+        """Connect servos.
+
+        Args:
+            servos: any number, in any state.
+            wire_time: whether bytes take their time; if not, only return delays count.
+        """
+        self.servos = tuple(servos)
+        self._wire_time = wire_time
+        self._parser = Parser()
+        self._baud_rate = 0.0
+        self._heard_at = float("-inf")
+        # The host's bytes and the servos' bytes each queue up behind their own kind.
+        self._sent_until = float("-inf")
+        self._replied_until = float("-inf")
+
+    def receive(self, data: bytes, now: float, baud_rate: float) -> list[Reply]:
+        """Take bytes that the host wrote and return the replies to come, in order.
+
+        Instructions act at once; their replies follow after the instruction's time on the wire,
+        the servo's return delay and the reply's own time on the wire.
+
+        Args:
+            data: any bytes.
+            now: when the host wrote them [s].
+            baud_rate: rate of the host's port [bit/s]; servos set to another one hear nothing.
+        """
+        if baud_rate != self._baud_rate or now - self._heard_at > GAP_S:
+            self._parser.reset()
+        self._baud_rate, self._heard_at = baud_rate, now
+        if baud_rate <= 0:
+            return []
+        byte_time = BITS_PER_BYTE / baud_rate if self._wire_time else 0.0
+        start = max(now, self._sent_until)
+        self._sent_until = start + len(data) * byte_time
+        replies = []
+        for end, packet in self._parser.feed(data):
+            reply = self._answer(packet, start + end * byte_time, byte_time)
+            if reply is not None:
+                replies.append(reply)
+        return replies
+
+    def _answer(self, packet: InstructionPacket, at: float, byte_time: float) -> Reply | None:
+        answers = []
+        for servo in self.servos:
+            if not _hears(servo, self._baud_rate):
+                continue
+            delay = servo.return_delay_s
+            status = servo.execute(packet)
+            if status is not None:
+                answers.append((delay, status.to_bytes()))
+        if not answers:
+            return None
+        data = answers[0][1]
+        for _, other in answers[1:]:
+            data = _collide(data, other)
+        start = max(at + min(delay for delay, _ in answers), self._replied_until)
+        self._replied_until = start + len(data) * byte_time
+        return Reply(self._replied_until, data)
+
+
+def _hears(servo: Servo, baud_rate: float) -> bool:
+    return abs(servo.baud_rate - baud_rate) <= RATE_TOLERANCE * servo.baud_rate
+
+
+def _collide(first: bytes, second: bytes) -> bytes:
+    """Return what is read when two servos drive the wire: the low level wins.
+
+    Two servos never start within the same bit, so that the second one is a bit late.
+    """
+    length = max(len(first), len(second))
+    idle = b"\xff"
+    pairs = zip(first.ljust(length, idle), second.ljust(length, idle), strict=True)
+    return bytes(a & (b << 1 | 1) & 0xFF for a, b in pairs)

@@ -1,0 +1,372 @@
+"""One AX-12: its registers, what instructions do to them, and the shaft that they drive."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from snake_control.mock import mechanics, units
+from snake_control.mock.control_table import (
+    BY_NAME,
+    LOCK_WRITABLE,
+    RegisterFile,
+    registers_in,
+)
+from snake_control.mock.health import Health, HealthParameters
+from snake_control.mock.protocol import (
+    BROADCAST_ID,
+    ErrorBit,
+    Instruction,
+    InstructionPacket,
+    StatusPacket,
+)
+from snake_control.mock.sensor import Sensor
+
+_PRESENT = BY_NAME["present_position"].address
+_PRESENT_END = BY_NAME["moving"].end
+_REST_RAD_S = 1e-3
+_REST_TIME_S = 0.1
+
+
+@dataclasses.dataclass(frozen=True)
+class ServoParameters:
+    """What a servo is made of, and how strictly it reads its manual.
+
+    Attributes:
+        motor: motor and gear.
+        health: warming and overload.
+        supply_voltage_v: voltage at power-on [V].
+        eeprom_needs_torque_off: refuse EEPROM writes while the servo is driven, as the e-manual
+            asks; the manual of 2006 knows no such rule.
+        goal_enables_torque: let a write of Goal Position in joint mode switch torque on, as users
+            report of some firmware.
+        shutdown_clears_torque_enable: let an alarm shutdown also clear Torque Enable (manual of
+            2006), beside setting Torque Limit to 0 (e-manual).
+    """
+
+    motor: mechanics.MotorParameters = dataclasses.field(default_factory=mechanics.MotorParameters)
+    health: HealthParameters = dataclasses.field(default_factory=HealthParameters)
+    supply_voltage_v: float = 11.1
+    eeprom_needs_torque_off: bool = True
+    goal_enables_torque: bool = False
+    shutdown_clears_torque_enable: bool = False
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.supply_voltage_v <= 25.5:
+            raise ValueError(f"supply_voltage_v = {self.supply_voltage_v!r}: give 0 to 25.5")
+
+
+class Servo:
+    """An AX-12 with its shaft; time passes only in ``step``.
+
+    Attributes:
+        registers: the control table; tests and faults may look and write.
+        motion: state of the shaft.
+        supply_voltage_v: voltage now [V].
+    """
+
+    def __init__(
+        self,
+        servo_id: int,
+        parameters: ServoParameters | None = None,
+        *,
+        angle_rad: float = 0.0,
+        eeprom: Mapping[str, int] | None = None,
+        rng: np.random.Generator | None = None,
+    ) -> None:
+        """Make a servo and switch its power on.
+
+        Args:
+            servo_id: 0 to 253.
+            parameters: of the motor and the firmware.
+            angle_rad: angle of the shaft, counter-clockwise from position 512 [rad].
+            eeprom: values that differ from the factory's, by register name.
+            rng: for what the position sensor reads in its dead zone.
+
+        Raises:
+            ValueError: a register that is no EEPROM, or a value outside its range.
+        """
+        self.parameters = parameters or ServoParameters()
+        self.registers = RegisterFile()
+        for name, value in {"id": servo_id, **(eeprom or {})}.items():
+            register = BY_NAME[name]
+            if not register.eeprom or not register.low <= value <= register.high:
+                raise ValueError(f"servo {servo_id}: {name} = {value!r} is no EEPROM value")
+            self.registers[name] = value
+        self.motion = mechanics.Motion(angle_rad=angle_rad)
+        self._sensor = Sensor(rng or np.random.default_rng(servo_id))
+        self.health = Health(self.parameters.health.ambient_c)
+        self.supply_voltage_v = self.parameters.supply_voltage_v
+        self.power_cycle()
+
+    def power_cycle(self) -> None:
+        """Switch the power off and on: RAM returns to its defaults, the shaft stays."""
+        r = self.registers
+        r.reset_ram()
+        r["torque_limit"] = r["max_torque"]
+        r["goal_position"] = self._sensor.position(self.motion.angle_rad)
+        self._driven = False
+        self._waiting: tuple[int, bytes] | None = None
+        self._conditions = ErrorBit.NONE
+        self._tripped = ErrorBit.NONE
+        self._executing = False
+        self._resting_for_s = 0.0
+        self.health.overloaded_for_s = 0.0
+        self._drive = self._read_drive()
+
+    # -- state ---------------------------------------------------------------------------------
+
+    @property
+    def id(self) -> int:
+        """The id that it answers to."""
+        return self.registers["id"]
+
+    @property
+    def baud_rate(self) -> float:
+        """Bits per second that it listens at: 2000000 / (register + 1)."""
+        return 2_000_000 / (self.registers["baud_rate"] + 1)
+
+    @property
+    def return_delay_s(self) -> float:
+        """Time between an instruction's last byte and the reply's first [s]."""
+        return self.registers["return_delay_time"] * 2e-6
+
+    @property
+    def wheel_mode(self) -> bool:
+        """Whether both angle limits are 0."""
+        return self.registers["cw_angle_limit"] == 0 == self.registers["ccw_angle_limit"]
+
+    @property
+    def driven(self) -> bool:
+        """Whether the motor is powered: after Torque Enable, or a Moving Speed in wheel mode."""
+        return self._driven
+
+    @property
+    def error(self) -> ErrorBit:
+        """Conditions that every reply reports; those that shut the servo down stay."""
+        return self._conditions | self._tripped
+
+    @property
+    def moving(self) -> bool:
+        """Whether a goal is being executed."""
+        return self._executing
+
+    # -- time ----------------------------------------------------------------------------------
+
+    def step(self, dt: float, load_nm: float = 0.0) -> None:
+        """Let ``dt`` seconds pass under a load: the torque that holding the joint takes [N m]."""
+        p, motion, drive = self.parameters, self.motion, self._drive
+        mechanics.advance(motion, drive, p.motor, load_nm, self.supply_voltage_v, dt)
+        self._sensor.step(motion.angle_rad, dt)
+        self.health.step(p.health, motion.output, self._overloaded(drive, load_nm), dt)
+        self._watch()
+        if self._executing:
+            self._follow_execution(drive, dt)
+
+    def _overloaded(self, drive: mechanics.Drive, load_nm: float) -> bool:
+        """Whether the load is more than the output and the gear's friction carry together."""
+        if not self._driven:
+            return False
+        limit = drive.torque_limit if isinstance(drive, mechanics.ToGoal) else abs(drive.output)
+        motor = self.parameters.motor
+        carried = limit * motor.torque(self.supply_voltage_v) + motor.friction_torque_nm
+        return limit > 0 and abs(load_nm) > carried
+
+    def _watch(self) -> None:
+        r = self.registers
+        self._conditions = self.health.conditions(
+            self.parameters.health,
+            self.supply_voltage_v,
+            (r["min_voltage_limit"] / 10, r["max_voltage_limit"] / 10),
+            r["temperature_limit"],
+        )
+        if not self._conditions:
+            return
+        tripping = self._conditions & r["alarm_shutdown"]
+        if tripping:
+            self._tripped |= tripping
+            r["torque_limit"] = 0
+            if self.parameters.shutdown_clears_torque_enable:
+                r["torque_enable"] = 0
+                self._driven = False
+            self._drive = self._read_drive()
+
+    def _follow_execution(self, drive: mechanics.Drive, dt: float) -> None:
+        at_rest = abs(self.motion.speed_rad_s) < _REST_RAD_S
+        self._resting_for_s = self._resting_for_s + dt if at_rest else 0.0
+        if not isinstance(drive, mechanics.ToGoal):
+            self._executing = False
+            return
+        error = drive.error(self.motion.angle_rad)
+        arrived = abs(error) <= drive.side(error).margin_rad
+        # A load can keep the shaft away from the margin for ever: then rest is the end.
+        self._executing = not arrived and self._resting_for_s < _REST_TIME_S
+
+    def _read_drive(self) -> mechanics.Drive:
+        """Turn the registers into what they ask of the motor."""
+        r = self.registers
+        if not self._driven:
+            return mechanics.OpenLoop()
+        limit = r["torque_limit"] / units.OUTPUT_STEPS
+        speed = r["moving_speed"]
+        if self.wheel_mode:
+            output = min((speed & 0x3FF) / units.OUTPUT_STEPS, limit)
+            return mechanics.OpenLoop(-output if speed & units.DIRECTION_BIT else output)
+        speed &= 0x3FF
+        return mechanics.ToGoal(
+            goal_rad=units.angle_from_ticks(r["goal_position"]),
+            speed_rad_s=speed * units.SPEED_UNIT_RAD_S if speed else math.inf,
+            ccw=mechanics.side(r["ccw_compliance_margin"], r["ccw_compliance_slope"]),
+            cw=mechanics.side(r["cw_compliance_margin"], r["cw_compliance_slope"]),
+            punch=r["punch"] / units.OUTPUT_STEPS,
+            torque_limit=limit,
+        )
+
+    # -- instructions --------------------------------------------------------------------------
+
+    def execute(self, packet: InstructionPacket) -> StatusPacket | None:
+        """Carry out an instruction and return the reply, ``None`` if the servo stays silent."""
+        if packet.id not in (self.id, BROADCAST_ID):
+            return None
+        own_id, level = self.id, self.registers["status_return_level"]
+        error, data = self._carry_out(packet)
+        if packet.id == BROADCAST_ID or level < _reply_level(packet.instruction):
+            return None
+        return StatusPacket(own_id, self.error | error, data)
+
+    def _carry_out(self, packet: InstructionPacket) -> tuple[ErrorBit, bytes]:
+        nothing = b""
+        if not packet.checksum_ok:
+            return ErrorBit.CHECKSUM, nothing
+        p = packet.parameters
+        match packet.instruction:
+            case Instruction.PING if not p:
+                return ErrorBit.NONE, nothing
+            case Instruction.READ if len(p) == 2:
+                return self._read(p[0], p[1])
+            case Instruction.WRITE if len(p) >= 2:
+                return self._write(p[0], p[1:]), nothing
+            case Instruction.REG_WRITE if len(p) >= 2:
+                return self._register_write(p[0], p[1:]), nothing
+            case Instruction.ACTION if not p:
+                return self._action(), nothing
+            case Instruction.SYNC_WRITE if packet.id == BROADCAST_ID:
+                return self._sync_write(p), nothing
+        # Also FACTORY_RESET, which the AX-12's firmware does not have, and BULK_READ.
+        return ErrorBit.INSTRUCTION, nothing
+
+    def _read(self, address: int, size: int) -> tuple[ErrorBit, bytes]:
+        try:
+            registers_in(address, size)
+        except IndexError:
+            return ErrorBit.RANGE, b""
+        if address < _PRESENT_END and address + size > _PRESENT:
+            self._measure()
+        return ErrorBit.NONE, self.registers.read(address, size)
+
+    def _write(self, address: int, data: bytes) -> ErrorBit:
+        error = self._check_write(address, data)
+        if not error:
+            self._apply(address, data)
+        return error
+
+    def _register_write(self, address: int, data: bytes) -> ErrorBit:
+        error = self._check_write(address, data)
+        if not error:
+            self._waiting = address, data
+            self.registers["registered"] = 1
+        return error
+
+    def _action(self) -> ErrorBit:
+        if self._waiting is None:
+            return ErrorBit.INSTRUCTION
+        address, data = self._waiting
+        self._waiting = None
+        self.registers["registered"] = 0
+        return self._write(address, data)
+
+    def _sync_write(self, parameters: bytes) -> ErrorBit:
+        if len(parameters) < 2:
+            return ErrorBit.INSTRUCTION
+        address, size = parameters[0], parameters[1]
+        entries = parameters[2:]
+        if len(entries) % (size + 1):
+            return ErrorBit.INSTRUCTION
+        error = ErrorBit.NONE
+        own_id = self.id
+        for start in range(0, len(entries), size + 1):
+            if entries[start] == own_id:
+                error |= self._write(address, entries[start + 1 : start + 1 + size])
+        return error
+
+    def _check_write(self, address: int, data: bytes) -> ErrorBit:
+        """Return why a write is refused; it is carried out wholly or not at all."""
+        r = self.registers
+        try:
+            touched = registers_in(address, len(data))
+        except IndexError:
+            return ErrorBit.RANGE
+        end = address + len(data)
+        if touched[0].address < address or touched[-1].end > end:
+            # Items of two bytes must be written in one packet.
+            return ErrorBit.RANGE
+        if r["lock"] and not (address in LOCK_WRITABLE and end - 1 in LOCK_WRITABLE):
+            return ErrorBit.RANGE
+        strict = self.parameters.eeprom_needs_torque_off
+        error = ErrorBit.NONE
+        for register in touched:
+            if not register.writable or (register.eeprom and strict and self._driven):
+                return ErrorBit.RANGE
+            offset = register.address - address
+            value = int.from_bytes(data[offset : offset + register.size], "little")
+            high = register.high
+            if register.name == "moving_speed" and not self.wheel_mode:
+                high = 1023
+            if not register.low <= value <= high:
+                return ErrorBit.RANGE
+            if register.name == "goal_position" and not self._goal_allowed(value):
+                error = ErrorBit.ANGLE_LIMIT
+        return error
+
+    def _goal_allowed(self, value: int) -> bool:
+        r = self.registers
+        return r["cw_angle_limit"] <= value <= r["ccw_angle_limit"]
+
+    def _apply(self, address: int, data: bytes) -> None:
+        r = self.registers
+        r.write(address, data)
+        names = {register.name for register in registers_in(address, len(data))}
+        if "torque_enable" in names:
+            self._driven = bool(r["torque_enable"])
+        if "moving_speed" in names and self.wheel_mode:
+            self._driven = True
+        if "goal_position" in names and self.parameters.goal_enables_torque:
+            self._driven = True
+            r["torque_enable"] = 1
+        if "torque_limit" in names and r["torque_limit"]:
+            self._tripped = ErrorBit.NONE
+        self._drive = self._read_drive()
+        if names & {"goal_position", "torque_enable"} and isinstance(self._drive, mechanics.ToGoal):
+            self._resting_for_s = 0.0
+            error = self._drive.error(self.motion.angle_rad)
+            self._executing = abs(error) > self._drive.side(error).margin_rad
+
+    def _measure(self) -> None:
+        """Fill the Present registers."""
+        r, motion, sensor = self.registers, self.motion, self._sensor
+        r["present_position"] = sensor.position(motion.angle_rad)
+        r["present_speed"] = sensor.speed(motion.speed_rad_s)
+        r["present_load"] = units.signed_magnitude(motion.output * units.OUTPUT_STEPS)
+        r["present_voltage"] = min(max(round(self.supply_voltage_v * 10), 0), 255)
+        r["present_temperature"] = min(max(round(self.health.temperature_c), 0), 255)
+        r["moving"] = int(self._executing)
+
+
+def _reply_level(instruction: int) -> int:
+    """Return the lowest Status Return Level at which an instruction is answered."""
+    if instruction == Instruction.PING:
+        return 0
+    return 1 if instruction == Instruction.READ else 2
