@@ -80,3 +80,36 @@ class SeriesFileError(SnakeError, ValueError):
     def __init__(self, path: str, reason: str) -> None:
         self.path = path
         super().__init__(f"{path}: {reason}")
+
+
+class NodeDiedError(SnakeError, ChildProcessError):
+    """A node's process ended while it was needed.
+
+    Attributes:
+        kind: which node.
+        code: its exit code, negative for a signal.
+        log: path of its log.
+        log_tail: the last lines it wrote.
+    """
+
+    def __init__(self, kind: str, code: int, log: str, log_tail: str) -> None:
+        self.kind = kind
+        self.code = code
+        self.log = log
+        self.log_tail = log_tail
+        how = f"by signal {-code}" if code < 0 else f"with exit code {code}"
+        super().__init__(f"node {kind} ended {how}; the end of {log}:\n{log_tail}")
+
+
+class NotReadyError(SnakeError, TimeoutError):
+    """Something did not happen within its time.
+
+    Attributes:
+        what: what was waited for.
+        timeout_s: for how long.
+    """
+
+    def __init__(self, what: str, timeout_s: float, found: str) -> None:
+        self.what = what
+        self.timeout_s = timeout_s
+        super().__init__(f"waited {timeout_s:g} s in vain for {what}; {found}")

@@ -1,1 +1,1 @@
-""""""
+"""Commands that people type."""

@@ -48,8 +48,9 @@ def draw_all(series: Series, case: int, directory: str | Path) -> list[Path]:
             "fig12_theta_bar": theta_bar(series, fell_at_s),
             "fig13_scps_and_V_h": scps(series, fell_at_s),
             "fig14_V_b1_and_d_min": base_costs(series, fell_at_s),
-            "fig15_motion": motion(series),
         }
+        if np.isfinite(np.hstack((series.w, series.phi))).all(axis=1).any():
+            figures["fig15_motion"] = motion(series)
         paths = []
         for name, figure in figures.items():
             title = figure.get_suptitle()
@@ -140,7 +141,10 @@ def base_costs(series: Series, fell_at_s: float | None) -> Figure:
     upper.set_ylabel("$V_{b1}$")
     if series.has_ground_truth:
         lower.plot(
-            t, 1e3 * series.numbers("d_min"), color=style.PALETTE[5], linewidth=1.0,
+            t,
+            1e3 * series.numbers("d_min"),
+            color=style.PALETTE[5],
+            linewidth=1.0,
             label="as the controller measures it",
         )
     lower.plot(t, 1e3 * series.d_min, color=style.ACTUAL, label="ground truth")

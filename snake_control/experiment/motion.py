@@ -10,6 +10,7 @@ from matplotlib.patches import Polygon
 from numpy.typing import NDArray
 
 from snake_control.config import RobotConfig
+from snake_control.errors import ModelError
 from snake_control.experiment import style
 from snake_control.experiment.series import Series
 from snake_control.model.geometry import geometry, link_points, wheel_contacts
@@ -21,12 +22,19 @@ SNAPSHOTS = 7
 
 
 def motion(series: Series) -> Figure:
-    """Draw the robot at evenly spaced times, each as one row: from above, from the side."""
+    """Draw the robot at evenly spaced times, each as one row: from above, from the side.
+
+    Raises:
+        ModelError: no step holds a finite posture.
+    """
     robot = series.robot
-    t = series.numbers("t_s")
+    q = np.hstack((series.w, series.phi))
+    known = np.isfinite(q).all(axis=1)
+    if not known.any():
+        raise ModelError("no posture is known throughout, so there is no motion to draw")
+    q, t, w_d = q[known], series.numbers("t_s")[known], series.numbers("w_d")[known]
+    w = q[:, :6]
     shown = snapshot_steps(t, SNAPSHOTS)
-    w, w_d = series.w, series.numbers("w_d")
-    q = np.hstack((w, series.phi))
     points = [link_points(robot, q[i]) for i in shown]
     everything = np.vstack((*points, w[:, :3], w_d[:, :3]))
     low, high = everything.min(axis=0) - 0.05, everything.max(axis=0) + 0.05

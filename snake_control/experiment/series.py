@@ -180,9 +180,9 @@ class Series:
             self._write_line(
                 self._file,
                 (
-                text
-                for field, column in self._columns.items()
-                for text in _texts(column, values[field])
+                    text
+                    for field, column in self._columns.items()
+                    for text in _texts(column, values[field])
                 ),
             )
 

@@ -239,7 +239,7 @@ def _limits(series: Series) -> dict[str, Any]:
     speed_limited = series.joints("speed_limited")
     hits = [i for i, joints in enumerate(range_limited) if joints]
     scale = series.numbers("speed_scale")
-    phi = np.abs(series.phi).reshape(len(series), -1)
+    phi = np.abs(series.phi)
     return {
         "joint_limit_steps": len(hits),
         "first_joint_at_range_end": range_limited[hits[0]][0] if hits else None,
@@ -248,7 +248,7 @@ def _limits(series: Series) -> dict[str, Any]:
         "speed_limit_steps": int(np.count_nonzero(scale < 1.0)),
         "speed_limit_steps_by_joint": _count_joints(speed_limited),
         "min_speed_scale": float(np.nanmin(scale)) if np.isfinite(scale).any() else None,
-        "max_abs_joint_angle_rad": float(phi.max()) if phi.size else None,
+        "max_abs_joint_angle_rad": float(np.nanmax(phi)) if np.isfinite(phi).any() else None,
     }
 
 

@@ -1,0 +1,385 @@
+"""The paper's experiment on a simulated robot, through real ROS 2 messages and servo bytes.
+
+    python -m snake_control.cli.demo --case 3 --duration 60 --out out/demo
+
+Starts the five nodes as processes, drives one case of the paper, stops the robot in order, and
+writes ``summary.json``, ``series.csv`` and the paper's figures.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import os
+import signal
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+import numpy as np
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.signals import SignalHandlerOptions
+from snake_interfaces.msg import BusState, ControllerState, PoseStatus
+from std_srvs.srv import SetBool, Trigger
+
+from snake_control.cli.demo_arguments import DemoArguments, parse_arguments
+from snake_control.cli.node_processes import NodeProcesses
+from snake_control.cli.progress import ProgressLine
+from snake_control.cli.ros_domain import own_domain
+from snake_control.config import Config
+from snake_control.errors import NodeDiedError, NotReadyError, SnakeError
+from snake_control.experiment.series import Series, Step
+from snake_control.experiment.summary import Run, summarise, write_summary
+from snake_control.experiment.table import format_summary
+from snake_control.nodes.recorder import FOLLOWING, STATUS_WORDS, Recorder
+from snake_control.nodes.topics import ENABLE, START, STOP, Service
+
+EXIT_OK, EXIT_FAILED, EXIT_USAGE = 0, 1, 2
+
+_STOP_ORDER = ("scp_controller", "trajectory_generator", "pose_input", "bus_driver", "mock_bus")
+_READY_TIMEOUT_S = 40.0
+_SILENCE_TIMEOUT_S = 5.0
+_SERVICE_TIMEOUT_S = 3.0
+_NODE_STOP_TIMEOUT_S = 8.0
+_AFTER_FALL_S = 2.0
+_BUS_STATES = {
+    BusState.STATE_INACTIVE: "inactive",
+    BusState.STATE_HOLDING: "holding",
+    BusState.STATE_MOVING: "moving",
+    BusState.STATE_TORQUE_OFF: "torque off",
+    BusState.STATE_STOPPED: "stopped by a fault",
+    BusState.STATE_EMERGENCY_STOP: "emergency stop",
+}
+
+
+class StopRequested(Exception):  # noqa: N818 - not an error: somebody pressed Ctrl-C
+    """SIGINT or SIGTERM arrived.
+
+    Attributes:
+        number: which.
+    """
+
+    def __init__(self, number: int) -> None:
+        self.number = number
+        super().__init__(f"interrupted by {signal.Signals(number).name}")
+
+
+@dataclasses.dataclass(frozen=True)
+class Outcome:
+    """How a run ended: in words, and as an exit code."""
+
+    ended: str
+    exit_code: int
+
+
+class Demo:
+    """One run: the processes, a node that listens, and the way through the phases."""
+
+    def __init__(self, arguments: DemoArguments, config: Config, directory: Path) -> None:
+        """Prepare a run; ``run`` starts the processes.
+
+        Args:
+            arguments: the command line.
+            config: what the nodes read from it.
+            directory: private directory for the port link and rcl's own logs.
+        """
+        self._arguments = arguments
+        self._config = config
+        self._port = directory / "servo_bus"
+        self._signal: int | None = None
+        self._progress = ProgressLine()
+        os.environ.setdefault("ROS_LOG_DIR", str(directory))
+        environment = os.environ | {
+            "RCUTILS_COLORIZED_OUTPUT": "0",
+            "PYTHONUNBUFFERED": "1",
+            # Matrices of 12 x 12 gain nothing from more threads, and two cores lose.
+            "OPENBLAS_NUM_THREADS": "1",
+        }
+        self.processes = NodeProcesses(arguments.out / "logs", environment)
+        self.series = Series(config.robot, arguments.out / "series.csv")
+        self.stop_findings: list[str] = []
+        self._node: Any = None
+        self._executor: SingleThreadedExecutor | None = None
+        self.recorder: Recorder | None = None
+
+    def run(self) -> Outcome:
+        """Go through the phases and return how it ended; the nodes have been stopped then."""
+        try:
+            outcome = self._follow()
+        except StopRequested as request:
+            outcome = Outcome(str(request), 128 + request.number)
+        except (NodeDiedError, NotReadyError) as error:
+            outcome = Outcome(str(error), EXIT_FAILED)
+        finally:
+            self._progress.close()
+            self._stop_in_order()
+        return outcome
+
+    def _follow(self) -> Outcome:
+        self._start_nodes()
+        self._wait_until_ready()
+        recorder = self._recorder()
+        recorder.start()
+        self._call("trajectory_generator", START, Trigger.Request(), _SERVICE_TIMEOUT_S)
+        self._progress.say("ready; the reference starts")
+        return self._watch(recorder)
+
+    def _start_nodes(self) -> None:
+        self._progress.say("starting the nodes")
+        # The processes are forked before rclpy has threads; the driver needs the mock's port.
+        for kind in ("mock_bus", "pose_input", "scp_controller", "trajectory_generator"):
+            self._start(kind)
+        deadline = time.monotonic() + _READY_TIMEOUT_S
+        while not self._port.exists():
+            self._check()
+            if time.monotonic() > deadline:
+                raise NotReadyError("the mock's port", _READY_TIMEOUT_S, f"no {self._port}")
+            time.sleep(0.02)
+        self._start("bus_driver")
+        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+        self._node = rclpy.create_node("demo")
+        self._executor = SingleThreadedExecutor()
+        self._executor.add_node(self._node)
+        self.recorder = Recorder(self._node, self.series)
+
+    def _start(self, kind: str) -> None:
+        given = ["--ros-args"]
+        for path in self._arguments.all_params_files:
+            given += ["--params-file", str(path)]
+        if kind in ("mock_bus", "bus_driver"):
+            given += ["-p", f"port:={self._port}"]
+        if kind == "mock_bus":
+            for name, value in self._arguments.mock_parameters.items():
+                given += ["-p", f"{name}:={value}"]
+        self.processes.start(kind, given)
+
+    def _wait_until_ready(self) -> None:
+        recorder = self._recorder()
+        deadline = time.monotonic() + _READY_TIMEOUT_S
+
+        def wait(what: str, condition: Callable[[], bool], found: Callable[[], str]) -> None:
+            if not self._spin_until(condition, deadline):
+                raise NotReadyError(what, _READY_TIMEOUT_S, found())
+
+        wait(
+            "bus_driver to hold all joints",
+            lambda: _holding(recorder.bus),
+            lambda: _bus_text(recorder.bus),
+        )
+        wait(
+            "a valid head pose",
+            lambda: recorder.head is not None and recorder.head.status == PoseStatus.STATUS_VALID,
+            lambda: f"pose_input says: {recorder.head.text if recorder.head else 'nothing'}",
+        )
+        wait(
+            "scp_controller to see joints and head",
+            lambda: _has_inputs(recorder.controller),
+            lambda: (
+                "scp_controller says: "
+                + (recorder.controller.text if recorder.controller else "nothing")
+            ),
+        )
+
+    def _watch(self, recorder: Recorder) -> Outcome:
+        duration_s, case = self._arguments.duration_s, self._config.controller.case
+        seen, heard = 0, time.monotonic()
+        fell_at_s: float | None = None
+        while True:
+            self._spin_once()
+            now = time.monotonic()
+            if len(self.series) > seen:
+                seen, heard = len(self.series), now
+            elif now - heard > _SILENCE_TIMEOUT_S:
+                raise NotReadyError(
+                    "the next control step", _SILENCE_TIMEOUT_S, "controller_state fell silent"
+                )
+            if recorder.bus is not None and recorder.bus.state in (
+                BusState.STATE_STOPPED,
+                BusState.STATE_EMERGENCY_STOP,
+            ):
+                return Outcome(_bus_text(recorder.bus), EXIT_FAILED)
+            step = recorder.latest
+            if step is None:
+                continue
+            if self._progress.due:
+                self._progress.show(_progress_text(step, duration_s))
+            if step.fallen and fell_at_s is None:
+                fell_at_s = step.t_s
+                self._progress.say(f"the robot fell at {fell_at_s:.1f} s")
+            if fell_at_s is not None and step.t_s >= min(fell_at_s + _AFTER_FALL_S, duration_s):
+                # The paper's Case 1 is meant to end badly.
+                code = EXIT_OK if case == 1 else EXIT_FAILED
+                return Outcome(f"the robot fell at {fell_at_s:.1f} s", code)
+            if step.t_s >= duration_s:
+                return Outcome("duration reached", EXIT_OK)
+
+    def _stop_in_order(self) -> None:
+        """Stop the reference, the controller and the driver, then the mock; never raises."""
+        if self._executor is not None:
+            if self.recorder is not None:
+                self.recorder.finish()
+            for node, service, request in (
+                ("trajectory_generator", STOP, Trigger.Request()),
+                ("scp_controller", ENABLE, SetBool.Request(data=False)),
+            ):
+                if not self.processes.is_running(node):
+                    continue
+                try:
+                    self._call(node, service, request, _SERVICE_TIMEOUT_S, checked=False)
+                except NotReadyError as error:
+                    self.stop_findings.append(str(error))
+        self.stop_findings += self.processes.stop(_STOP_ORDER, _NODE_STOP_TIMEOUT_S)
+        self.series.close()
+        if self._executor is not None:
+            self._executor.shutdown()
+            self._node.destroy_node()
+            rclpy.try_shutdown()
+
+    def _call(
+        self, node: str, service: Service, request: Any, timeout_s: float, checked: bool = True
+    ) -> None:
+        """Call a node's service; while ``checked``, signals and dead nodes end the waiting."""
+        name = service.name.replace("~", node, 1)
+        client = self._node.create_client(service.type, name)
+        deadline = time.monotonic() + timeout_s
+        if not self._spin_until(client.service_is_ready, deadline, checked):
+            raise NotReadyError(f"service {name}", timeout_s, "nobody offers it")
+        future = client.call_async(request)
+        if not self._spin_until(future.done, deadline, checked):
+            raise NotReadyError(f"a reply of {name}", timeout_s, "no reply")
+        response = future.result()
+        if not response.success:
+            raise NotReadyError(f"success of {name}", timeout_s, f"it says: {response.message}")
+
+    def _spin_until(
+        self, condition: Callable[[], bool], deadline: float, checked: bool = True
+    ) -> bool:
+        while not condition():
+            if time.monotonic() > deadline:
+                return False
+            self._spin_once(checked)
+        return True
+
+    def _spin_once(self, checked: bool = True) -> None:
+        if checked:
+            self._check()
+        assert self._executor is not None
+        self._executor.spin_once(timeout_sec=0.05)
+
+    def _check(self) -> None:
+        if self._signal is not None:
+            raise StopRequested(self._signal)
+        self.processes.check()
+
+    def _recorder(self) -> Recorder:
+        assert self.recorder is not None
+        return self.recorder
+
+    def on_signal(self, number: int, _frame: FrameType | None) -> None:
+        """Take note that the run shall end (a signal handler)."""
+        self._signal = number
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the demo; return its exit code.
+
+    0: done (Case 1 may also fall); 1: fell, a node died or did not get ready; 2: bad arguments or
+    configuration; 130, 143: stopped by SIGINT, SIGTERM.
+    """
+    arguments = parse_arguments(argv)
+    try:
+        config = arguments.load()
+        arguments.prepare_out()
+    except SnakeError as error:
+        print(f"configuration error: {error}", file=sys.stderr)
+        return EXIT_USAGE
+    except OSError as error:
+        print(f"cannot write to {arguments.out}: {error}", file=sys.stderr)
+        return EXIT_USAGE
+    with own_domain(), tempfile.TemporaryDirectory(prefix="snake_control_demo_") as directory:
+        demo = Demo(arguments, config, Path(directory))
+        # Also while the results are written: a second Ctrl-C must not lose them.
+        with _signals(demo.on_signal):
+            try:
+                outcome = demo.run()
+            finally:
+                demo.processes.kill()
+            _write_results(arguments, config, demo, outcome)
+    return outcome.exit_code
+
+
+def _write_results(arguments: DemoArguments, config: Config, demo: Demo, outcome: Outcome) -> None:
+    # Here, because matplotlib takes a second to load and the robot shall not wait for it.
+    from snake_control.experiment.figures import draw_all
+
+    run = Run(
+        case=config.controller.case,
+        K=config.controller.K,
+        ended=outcome.ended.splitlines()[0],
+        parameters=arguments.summary_parameters(config),
+        bus=demo.recorder.bus_totals() if demo.recorder else None,
+    )
+    summary = summarise(demo.series, run)
+    summary["exit_code"] = outcome.exit_code
+    summary["stop_findings"] = demo.stop_findings
+    write_summary(summary, arguments.out / "summary.json")
+    figures = draw_all(demo.series, run.case, arguments.out)
+    if outcome.exit_code != EXIT_OK:
+        print(outcome.ended, file=sys.stderr)
+    for finding in demo.stop_findings:
+        print(f"while stopping: {finding}", file=sys.stderr)
+    print(f"\n{format_summary(summary)}\n")
+    for path in (arguments.out / "summary.json", arguments.out / "series.csv", *figures):
+        print(path)
+    print(f"{arguments.out / 'logs'}{os.sep}")
+
+
+def _holding(bus: BusState | None) -> bool:
+    return bus is not None and bus.state == BusState.STATE_HOLDING
+
+
+def _bus_text(bus: BusState | None) -> str:
+    if bus is None:
+        return "bus_driver says nothing"
+    return f"bus_driver is {_BUS_STATES.get(bus.state, bus.state)}: {bus.text}"
+
+
+def _has_inputs(controller: ControllerState | None) -> bool:
+    return (
+        controller is not None
+        and controller.status in (ControllerState.STATUS_WAITING, *FOLLOWING)
+        and math.isfinite(controller.joint_states_age)
+        and math.isfinite(controller.head_age)
+    )
+
+
+def _progress_text(step: Step, duration_s: float) -> str:
+    error = step.error
+    position_mm = 1e3 * float(np.linalg.norm(error[:3]))
+    rotation = float(np.abs(error[3:]).max())
+    d_min = step.d_min_true if math.isfinite(step.d_min_true) else step.d_min
+    text = (
+        f"{step.t_s:5.1f} / {duration_s:g} s   error {position_mm:6.1f} mm {rotation:.3f} rad   "
+        f"V_b1 {step.V_b1:8.2e}   d_min {1e3 * d_min:5.1f} mm   bus {step.bus_rate_hz:4.1f} Hz"
+    )
+    return text if step.status == STATUS_WORDS[FOLLOWING[0]] else f"{text}   {step.status}"
+
+
+@contextmanager
+def _signals(handler: Callable[[int, FrameType | None], None]) -> Iterator[None]:
+    before = {number: signal.signal(number, handler) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield
+    finally:
+        for number, old in before.items():
+            signal.signal(number, old)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,178 @@
+"""Joins what the nodes publish into one row for each control step."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+
+from rclpy.node import Node
+from snake_interfaces.msg import BusState, ControllerState, PlantState, PoseStatus
+
+from snake_control.experiment.series import Series, Step
+from snake_control.experiment.summary import BusTotals
+from snake_control.nodes.topics import BUS_STATE, CONTROLLER_STATE, HEAD_STATUS, PLANT_STATE
+
+STATUS_WORDS = {
+    ControllerState.STATUS_DISABLED: "disabled",
+    ControllerState.STATUS_WAITING: "waiting",
+    ControllerState.STATUS_TRACKING: "tracking",
+    ControllerState.STATUS_LIMITED: "limited",
+    ControllerState.STATUS_STALE: "stale",
+    ControllerState.STATUS_INVALID: "invalid",
+    ControllerState.STATUS_FAULT: "fault",
+}
+FOLLOWING = (ControllerState.STATUS_TRACKING, ControllerState.STATUS_LIMITED)
+
+_GROUND_TRUTH_WAIT_NS = 500_000_000
+_GROUND_TRUTH_KEPT = 400
+
+
+class Recorder:
+    """Subscribes to a robot's state topics and fills a ``Series``.
+
+    Each control step gets the ground truth nearest to its stamp and the latest bus cycle before it.
+    Time zero is the first step that follows a reference after ``start``. Runs in the executor of
+    the node it was given; not thread-safe.
+
+    Attributes:
+        bus: latest bus state, ``None`` before the first.
+        head: latest status of the head pose, ``None`` before the first.
+        controller: latest controller state, ``None`` before the first.
+        latest: newest row of the series, ``None`` before the first.
+    """
+
+    def __init__(self, node: Node, series: Series) -> None:
+        """Subscribe; rows are appended to ``series`` once ``start`` was called."""
+        self.bus: BusState | None = None
+        self.head: PoseStatus | None = None
+        self.controller: ControllerState | None = None
+        self.latest: Step | None = None
+        self._series = series
+        self._recording = False
+        self._zero_ns: int | None = None
+        self._waiting: deque[tuple[int, ControllerState, BusState | None]] = deque()
+        self._truth: deque[tuple[int, PlantState]] = deque(maxlen=_GROUND_TRUTH_KEPT)
+        self._cycle_times_s: list[float] = []
+        self._first_bus_ns: int | None = None
+        self._last_bus_ns = 0
+        self._lost: set[int] = set()
+        for topic, callback in (
+            (BUS_STATE, self._take_bus),
+            (HEAD_STATUS, self._take_head),
+            (CONTROLLER_STATE, self._take_controller),
+            (PLANT_STATE, self._take_truth),
+        ):
+            node.create_subscription(topic.type, topic.name, callback, topic.qos)
+
+    def start(self) -> None:
+        """Record from the next control step that follows a reference."""
+        self._recording = True
+
+    def finish(self) -> None:
+        """Stop recording; steps still waiting for their ground truth get the nearest there is."""
+        self._join(everything=True)
+        self._recording = False
+
+    def bus_totals(self) -> BusTotals | None:
+        """Return what the bus did while recording; ``None`` if it was never heard."""
+        if self.bus is None:
+            return None
+        servos = self.bus.servos
+        started_ns = self._last_bus_ns if self._first_bus_ns is None else self._first_bus_ns
+        return BusTotals(
+            cycle_times_s=tuple(self._cycle_times_s),
+            cycles=self.bus.cycles,
+            late_cycles=self.bus.late_cycles,
+            replies=sum(servo.replies for servo in servos),
+            misses=sum(servo.misses for servo in servos),
+            retries=sum(servo.retries for servo in servos),
+            corrupt_replies=sum(servo.corrupt_replies for servo in servos),
+            invalid_values=sum(servo.invalid_values for servo in servos),
+            lost=tuple(sorted(self._lost)),
+            duration_s=(self._last_bus_ns - started_ns) * 1e-9,
+        )
+
+    def _take_bus(self, message: BusState) -> None:
+        self.bus = message
+        if not self._recording:
+            return
+        self._last_bus_ns = _nanoseconds(message)
+        if self._first_bus_ns is None:
+            self._first_bus_ns = self._last_bus_ns
+        self._cycle_times_s.append(message.cycle_time)
+        self._lost |= {_joint(servo.joint) for servo in message.servos if not servo.online}
+
+    def _take_head(self, message: PoseStatus) -> None:
+        self.head = message
+
+    def _take_controller(self, message: ControllerState) -> None:
+        self.controller = message
+        if not self._recording:
+            return
+        stamp = _nanoseconds(message)
+        if self._zero_ns is None:
+            if message.status not in FOLLOWING:
+                return
+            self._zero_ns = stamp
+        self._waiting.append((stamp, message, self.bus))
+        self._join()
+
+    def _take_truth(self, message: PlantState) -> None:
+        self._truth.append((_nanoseconds(message), message))
+        self._join()
+
+    def _join(self, everything: bool = False) -> None:
+        while self._waiting:
+            stamp, controller, bus = self._waiting[0]
+            known_until = self._truth[-1][0] if self._truth else 0
+            overdue = self._waiting[-1][0] - stamp > _GROUND_TRUTH_WAIT_NS
+            if known_until < stamp and not overdue and not everything:
+                return
+            self._waiting.popleft()
+            truth = min(self._truth, key=lambda entry: abs(entry[0] - stamp), default=(0, None))
+            near = abs(truth[0] - stamp) <= _GROUND_TRUTH_WAIT_NS
+            assert self._zero_ns is not None
+            self.latest = _step(
+                (stamp - self._zero_ns) * 1e-9, controller, bus, truth[1] if near else None
+            )
+            self._series.append(self.latest)
+
+
+def _step(
+    t_s: float, controller: ControllerState, bus: BusState | None, truth: PlantState | None
+) -> Step:
+    return Step(
+        t_s=t_s,
+        status=STATUS_WORDS[controller.status],
+        w_measured=controller.w,
+        w_d=controller.w_d,
+        phi_measured=controller.phi,
+        u_unlimited=controller.u_unlimited,
+        u=controller.u,
+        phi_tilde_dot_d=controller.phi_tilde_dot_d,
+        speed_scale=controller.speed_scale,
+        speed_limited=tuple(map(_joint, controller.speed_limited)),
+        range_limited=tuple(map(_joint, controller.range_limited)),
+        V_h=controller.v_h,
+        V_b1=controller.v_b1,
+        d_min=controller.d_min,
+        sigma_min_B_tilde=controller.sigma_min_b_tilde,
+        sigma_min_A_hat=controller.sigma_min_a_hat,
+        w=None if truth is None else truth.w,
+        phi=None if truth is None else truth.phi,
+        d_min_true=math.nan if truth is None else truth.d_min,
+        fallen=truth is not None and truth.fallen,
+        slip=None if truth is None else truth.slip,
+        step_time_s=controller.step_time,
+        bus_cycle_time_s=math.nan if bus is None else bus.cycle_time,
+        bus_rate_hz=math.nan if bus is None else bus.cycle_rate,
+    )
+
+
+def _nanoseconds(message: object) -> int:
+    stamp = message.header.stamp  # type: ignore[attr-defined]
+    return int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)
+
+
+def _joint(name: str) -> int:
+    return int(name.rpartition("_")[2])
