@@ -5,7 +5,8 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 
-from snake_control.mock.protocol import InstructionPacket, Parser
+from snake_control.mock.firmware import execute
+from snake_control.mock.protocol import BROADCAST_ID, InstructionPacket, Parser
 from snake_control.mock.servo import Servo
 
 BITS_PER_BYTE = 10
@@ -84,10 +85,10 @@ class Bus:
     def _answer(self, packet: InstructionPacket, at: float, byte_time: float) -> Reply | None:
         answers = []
         for servo in self.servos:
-            if not _hears(servo, self._baud_rate):
+            if packet.id not in (servo.id, BROADCAST_ID) or not _hears(servo, self._baud_rate):
                 continue
             delay = servo.return_delay_s
-            status = servo.execute(packet)
+            status = execute(servo, packet)
             if status is not None:
                 answers.append((delay, status.to_bytes()))
         if not answers:

@@ -108,6 +108,7 @@ TABLE: tuple[Register, ...] = (
 )
 
 BY_NAME: Mapping[str, Register] = {register.name: register for register in TABLE}
+_SPAN: Mapping[str, slice] = {r.name: slice(r.address, r.end) for r in TABLE}
 _AT: Mapping[int, Register] = {
     address: register for register in TABLE for address in range(register.address, register.end)
 }
@@ -134,12 +135,11 @@ class RegisterFile:
             self[register.name] = register.default
 
     def __getitem__(self, name: str) -> int:
-        register = BY_NAME[name]
-        return int.from_bytes(self._bytes[register.address : register.end], "little")
+        return int.from_bytes(self._bytes[_SPAN[name]], "little")
 
     def __setitem__(self, name: str, value: int) -> None:
         register = BY_NAME[name]
-        self._bytes[register.address : register.end] = value.to_bytes(register.size, "little")
+        self._bytes[_SPAN[name]] = value.to_bytes(register.size, "little")
 
     def read(self, address: int, size: int) -> bytes:
         """Return ``size`` bytes; the caller has checked the bounds with ``registers_in``."""

@@ -1,4 +1,4 @@
-"""One AX-12: its registers, what instructions do to them, and the shaft that they drive."""
+"""One AX-12: its registers, and the motor, sensor and alarms that they rule."""
 
 from __future__ import annotations
 
@@ -9,24 +9,11 @@ from collections.abc import Mapping
 import numpy as np
 
 from snake_control.mock import mechanics, units
-from snake_control.mock.control_table import (
-    BY_NAME,
-    LOCK_WRITABLE,
-    RegisterFile,
-    registers_in,
-)
+from snake_control.mock.control_table import BY_NAME, RegisterFile, registers_in
 from snake_control.mock.health import Health, HealthParameters
-from snake_control.mock.protocol import (
-    BROADCAST_ID,
-    ErrorBit,
-    Instruction,
-    InstructionPacket,
-    StatusPacket,
-)
+from snake_control.mock.protocol import ErrorBit
 from snake_control.mock.sensor import Sensor
 
-_PRESENT = BY_NAME["present_position"].address
-_PRESENT_END = BY_NAME["moving"].end
 _REST_RAD_S = 1e-3
 _REST_TIME_S = 0.1
 
@@ -63,9 +50,16 @@ class Servo:
     """An AX-12 with its shaft; time passes only in ``step``.
 
     Attributes:
-        registers: the control table; tests and faults may look and write.
+        parameters: what it is made of.
+        registers: the control table; change it through ``store`` or ``store_bytes``.
         motion: state of the shaft.
+        health: temperature and overload.
         supply_voltage_v: voltage now [V].
+        waiting: address and bytes of a REG_WRITE that waits for its ACTION.
+        id: the id that it answers to.
+        baud_rate: bits per second that it listens at, 2000000 / (register + 1).
+        return_delay_s: from an instruction's last byte to the reply's first [s].
+        wheel_mode: whether both angle limits are 0.
     """
 
     def __init__(
@@ -109,35 +103,13 @@ class Servo:
         r["torque_limit"] = r["max_torque"]
         r["goal_position"] = self._sensor.position(self.motion.angle_rad)
         self._driven = False
-        self._waiting: tuple[int, bytes] | None = None
+        self.waiting: tuple[int, bytes] | None = None
         self._conditions = ErrorBit.NONE
         self._tripped = ErrorBit.NONE
         self._executing = False
         self._resting_for_s = 0.0
         self.health.overloaded_for_s = 0.0
-        self._drive = self._read_drive()
-
-    # -- state ---------------------------------------------------------------------------------
-
-    @property
-    def id(self) -> int:
-        """The id that it answers to."""
-        return self.registers["id"]
-
-    @property
-    def baud_rate(self) -> float:
-        """Bits per second that it listens at: 2000000 / (register + 1)."""
-        return 2_000_000 / (self.registers["baud_rate"] + 1)
-
-    @property
-    def return_delay_s(self) -> float:
-        """Time between an instruction's last byte and the reply's first [s]."""
-        return self.registers["return_delay_time"] * 2e-6
-
-    @property
-    def wheel_mode(self) -> bool:
-        """Whether both angle limits are 0."""
-        return self.registers["cw_angle_limit"] == 0 == self.registers["ccw_angle_limit"]
+        self._refresh()
 
     @property
     def driven(self) -> bool:
@@ -153,8 +125,6 @@ class Servo:
     def moving(self) -> bool:
         """Whether a goal is being executed."""
         return self._executing
-
-    # -- time ----------------------------------------------------------------------------------
 
     def step(self, dt: float, load_nm: float = 0.0) -> None:
         """Let ``dt`` seconds pass under a load: the torque that holding the joint takes [N m]."""
@@ -176,23 +146,20 @@ class Servo:
         return limit > 0 and abs(load_nm) > carried
 
     def _watch(self) -> None:
-        r = self.registers
         self._conditions = self.health.conditions(
             self.parameters.health,
             self.supply_voltage_v,
-            (r["min_voltage_limit"] / 10, r["max_voltage_limit"] / 10),
-            r["temperature_limit"],
+            self._voltage_limits_v,
+            self._temperature_limit_c,
         )
         if not self._conditions:
             return
-        tripping = self._conditions & r["alarm_shutdown"]
+        tripping = self._conditions & self.registers["alarm_shutdown"]
         if tripping:
             self._tripped |= tripping
-            r["torque_limit"] = 0
+            self.store("torque_limit", 0)
             if self.parameters.shutdown_clears_torque_enable:
-                r["torque_enable"] = 0
-                self._driven = False
-            self._drive = self._read_drive()
+                self.store("torque_enable", 0)
 
     def _follow_execution(self, drive: mechanics.Drive, dt: float) -> None:
         at_rest = abs(self.motion.speed_rad_s) < _REST_RAD_S
@@ -204,6 +171,17 @@ class Servo:
         arrived = abs(error) <= drive.side(error).margin_rad
         # A load can keep the shaft away from the margin for ever: then rest is the end.
         self._executing = not arrived and self._resting_for_s < _REST_TIME_S
+
+    def _refresh(self) -> None:
+        """Take over what the registers say; reading them in every step would cost too much."""
+        r = self.registers
+        self.id = r["id"]
+        self.baud_rate = 2_000_000 / (r["baud_rate"] + 1)
+        self.return_delay_s = r["return_delay_time"] * 2e-6
+        self.wheel_mode = r["cw_angle_limit"] == 0 == r["ccw_angle_limit"]
+        self._voltage_limits_v = r["min_voltage_limit"] / 10, r["max_voltage_limit"] / 10
+        self._temperature_limit_c = float(r["temperature_limit"])
+        self._drive = self._read_drive()
 
     def _read_drive(self) -> mechanics.Drive:
         """Turn the registers into what they ask of the motor."""
@@ -225,122 +203,19 @@ class Servo:
             torque_limit=limit,
         )
 
-    # -- instructions --------------------------------------------------------------------------
+    def store(self, name: str, value: int) -> None:
+        """Set a register by name, whether an instruction could or not, with all that follows."""
+        register = BY_NAME[name]
+        self.store_bytes(register.address, value.to_bytes(register.size, "little"))
 
-    def execute(self, packet: InstructionPacket) -> StatusPacket | None:
-        """Carry out an instruction and return the reply, ``None`` if the servo stays silent."""
-        if packet.id not in (self.id, BROADCAST_ID):
-            return None
-        own_id, level = self.id, self.registers["status_return_level"]
-        error, data = self._carry_out(packet)
-        if packet.id == BROADCAST_ID or level < _reply_level(packet.instruction):
-            return None
-        return StatusPacket(own_id, self.error | error, data)
-
-    def _carry_out(self, packet: InstructionPacket) -> tuple[ErrorBit, bytes]:
-        nothing = b""
-        if not packet.checksum_ok:
-            return ErrorBit.CHECKSUM, nothing
-        p = packet.parameters
-        match packet.instruction:
-            case Instruction.PING if not p:
-                return ErrorBit.NONE, nothing
-            case Instruction.READ if len(p) == 2:
-                return self._read(p[0], p[1])
-            case Instruction.WRITE if len(p) >= 2:
-                return self._write(p[0], p[1:]), nothing
-            case Instruction.REG_WRITE if len(p) >= 2:
-                return self._register_write(p[0], p[1:]), nothing
-            case Instruction.ACTION if not p:
-                return self._action(), nothing
-            case Instruction.SYNC_WRITE if packet.id == BROADCAST_ID:
-                return self._sync_write(p), nothing
-        # Also FACTORY_RESET, which the AX-12's firmware does not have, and BULK_READ.
-        return ErrorBit.INSTRUCTION, nothing
-
-    def _read(self, address: int, size: int) -> tuple[ErrorBit, bytes]:
-        try:
-            registers_in(address, size)
-        except IndexError:
-            return ErrorBit.RANGE, b""
-        if address < _PRESENT_END and address + size > _PRESENT:
-            self._measure()
-        return ErrorBit.NONE, self.registers.read(address, size)
-
-    def _write(self, address: int, data: bytes) -> ErrorBit:
-        error = self._check_write(address, data)
-        if not error:
-            self._apply(address, data)
-        return error
-
-    def _register_write(self, address: int, data: bytes) -> ErrorBit:
-        error = self._check_write(address, data)
-        if not error:
-            self._waiting = address, data
-            self.registers["registered"] = 1
-        return error
-
-    def _action(self) -> ErrorBit:
-        if self._waiting is None:
-            return ErrorBit.INSTRUCTION
-        address, data = self._waiting
-        self._waiting = None
-        self.registers["registered"] = 0
-        return self._write(address, data)
-
-    def _sync_write(self, parameters: bytes) -> ErrorBit:
-        if len(parameters) < 2:
-            return ErrorBit.INSTRUCTION
-        address, size = parameters[0], parameters[1]
-        entries = parameters[2:]
-        if len(entries) % (size + 1):
-            return ErrorBit.INSTRUCTION
-        error = ErrorBit.NONE
-        own_id = self.id
-        for start in range(0, len(entries), size + 1):
-            if entries[start] == own_id:
-                error |= self._write(address, entries[start + 1 : start + 1 + size])
-        return error
-
-    def _check_write(self, address: int, data: bytes) -> ErrorBit:
-        """Return why a write is refused; it is carried out wholly or not at all."""
-        r = self.registers
-        try:
-            touched = registers_in(address, len(data))
-        except IndexError:
-            return ErrorBit.RANGE
-        end = address + len(data)
-        if touched[0].address < address or touched[-1].end > end:
-            # Items of two bytes must be written in one packet.
-            return ErrorBit.RANGE
-        if r["lock"] and not (address in LOCK_WRITABLE and end - 1 in LOCK_WRITABLE):
-            return ErrorBit.RANGE
-        strict = self.parameters.eeprom_needs_torque_off
-        error = ErrorBit.NONE
-        for register in touched:
-            if not register.writable or (register.eeprom and strict and self._driven):
-                return ErrorBit.RANGE
-            offset = register.address - address
-            value = int.from_bytes(data[offset : offset + register.size], "little")
-            high = register.high
-            if register.name == "moving_speed" and not self.wheel_mode:
-                high = 1023
-            if not register.low <= value <= high:
-                return ErrorBit.RANGE
-            if register.name == "goal_position" and not self._goal_allowed(value):
-                error = ErrorBit.ANGLE_LIMIT
-        return error
-
-    def _goal_allowed(self, value: int) -> bool:
-        r = self.registers
-        return r["cw_angle_limit"] <= value <= r["ccw_angle_limit"]
-
-    def _apply(self, address: int, data: bytes) -> None:
+    def store_bytes(self, address: int, data: bytes) -> None:
+        """Set whole registers, whether an instruction could or not, with all that follows."""
         r = self.registers
         r.write(address, data)
         names = {register.name for register in registers_in(address, len(data))}
         if "torque_enable" in names:
             self._driven = bool(r["torque_enable"])
+        # The mode before the write counts, which no block of registers can change with the speed.
         if "moving_speed" in names and self.wheel_mode:
             self._driven = True
         if "goal_position" in names and self.parameters.goal_enables_torque:
@@ -348,14 +223,14 @@ class Servo:
             r["torque_enable"] = 1
         if "torque_limit" in names and r["torque_limit"]:
             self._tripped = ErrorBit.NONE
-        self._drive = self._read_drive()
+        self._refresh()
         if names & {"goal_position", "torque_enable"} and isinstance(self._drive, mechanics.ToGoal):
             self._resting_for_s = 0.0
             error = self._drive.error(self.motion.angle_rad)
             self._executing = abs(error) > self._drive.side(error).margin_rad
 
-    def _measure(self) -> None:
-        """Fill the Present registers."""
+    def measure(self) -> None:
+        """Fill the Present registers and Moving."""
         r, motion, sensor = self.registers, self.motion, self._sensor
         r["present_position"] = sensor.position(motion.angle_rad)
         r["present_speed"] = sensor.speed(motion.speed_rad_s)
@@ -363,10 +238,3 @@ class Servo:
         r["present_voltage"] = min(max(round(self.supply_voltage_v * 10), 0), 255)
         r["present_temperature"] = min(max(round(self.health.temperature_c), 0), 255)
         r["moving"] = int(self._executing)
-
-
-def _reply_level(instruction: int) -> int:
-    """Return the lowest Status Return Level at which an instruction is answered."""
-    if instruction == Instruction.PING:
-        return 0
-    return 1 if instruction == Instruction.READ else 2
