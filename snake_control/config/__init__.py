@@ -1,8 +1,8 @@
 """Configuration: one YAML in ROS parameter form, one loader for nodes and for plain Python.
 
-    from snake_control.config import load
-    config = load("config/paper_robot.yaml", "config/mock.yaml")
-    config.robot.links
+from snake_control.config import load
+config = load("config/paper_robot.yaml", "config/mock.yaml")
+config.robot.links
 """
 
 from snake_control.config.loader import (

@@ -121,5 +121,5 @@ def _check_head_scps(
         raise ConfigError(
             field,
             given,
-            "Condition 3: the head joints that are not H-SCPs must not all turn about the same axis",
+            "Condition 3: the head joints that are no H-SCPs must not all turn about one axis",
         )

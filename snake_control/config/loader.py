@@ -17,7 +17,7 @@ from snake_control.config.nodes import (
 )
 from snake_control.config.parameter import Parameter, parameters
 from snake_control.config.robot import ControllerConfig, RobotConfig, ServosConfig
-from snake_control.config.yaml_file import matches, read_sections
+from snake_control.config.yaml_file import read_sections
 from snake_control.errors import ConfigError
 
 _SHARED_GROUPS: dict[str, type] = {
@@ -73,6 +73,8 @@ def load(*paths: str | Path) -> Config:
     for path in paths:
         for pattern, values in read_sections(path):
             nodes = _nodes_of(pattern)
+            if not nodes:
+                continue
             known = known_parameters(nodes)
             for field, value in values.items():
                 if not is_ros_parameter(field):

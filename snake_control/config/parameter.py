@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import array
 import dataclasses
 import math
 import types
@@ -51,11 +52,9 @@ class Parameter:
         """
         if not self.is_list:
             return self._parse_element(field, value)
-        if isinstance(value, str | bytes) or not isinstance(value, Sequence):
-            # rclpy delivers array.array, which is no registered Sequence on every Python.
-            if not hasattr(value, "tolist"):
-                raise ConfigError(field, value, f"give a list of {self._kind_name()}")
-            value = value.tolist()
+        # rclpy delivers array.array.
+        if isinstance(value, str | bytes) or not isinstance(value, Sequence | array.array):
+            raise ConfigError(field, value, f"give a list, each entry {self._kind_name()}")
         return tuple(
             self._parse_element(f"{field}[{i}]", element) for i, element in enumerate(value)
         )

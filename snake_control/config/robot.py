@@ -6,16 +6,19 @@ import dataclasses
 import math
 from collections.abc import Mapping
 from types import MappingProxyType
+from typing import TypeVar
 
 from snake_control.config.conditions import check_conditions
 from snake_control.config.parameter import parameter
 from snake_control.errors import ConfigError
 
+_T = TypeVar("_T")
+
 _DEGREE = math.pi / 180
 _SERVO_HALF_RANGE_RAD = 150 * _DEGREE
 
 
-def per_joint(field: str, values: tuple, joints: int) -> tuple:
+def per_joint(field: str, values: tuple[_T, ...], joints: int) -> tuple[_T, ...]:
     """Return ``values`` as one entry for each joint; a single entry stands for all joints.
 
     Raises:
@@ -71,8 +74,7 @@ class RobotConfig:
         (5.5,), "largest speed of each joint, or one for all [rad/s]", low=1e-3, high=100.0
     )
     start_joint_angles_rad: tuple[float, ...] = parameter(
-        (-0.11, 0.0, 0.0, 0.0, 1.1)
-        + tuple(math.pi / d for d in (-9, 6, 6, -9, -6, -10)),
+        (-0.11, 0.0, 0.0, 0.0, 1.1, *tuple(math.pi / d for d in (-9, 6, 6, -9, -6, -10))),
         "posture at the start of the experiment, phi(0) of Table 1 [rad]",
         low=-2 * math.pi,
         high=2 * math.pi,
@@ -109,10 +111,10 @@ class RobotConfig:
         field = "robot.joint_limits_rad"
         limits = self.joint_limits_rad
         if len(limits) != 2 * self.joints:
-            symmetric = per_joint(field, limits, self.joints)
-            for i, limit in enumerate(symmetric):
+            for i, limit in enumerate(limits):
                 if limit <= 0:
                     raise ConfigError(f"{field}[{i}]", limit, "allowed: more than 0")
+            symmetric = per_joint(field, limits, self.joints)
             limits = tuple(bound for limit in symmetric for bound in (-limit, limit))
             object.__setattr__(self, "joint_limits_rad", limits)
         for joint in range(1, self.joints + 1):
@@ -171,7 +173,8 @@ class ServosConfig:
         (0,), "bus id of each joint's servo ([0]: 1 .. n-1 in joint order)", low=0, high=252
     )
     directions: tuple[int, ...] = parameter(
-        (1,), "+1 if the servo's counter-clockwise is the joint's positive direction, else -1",
+        (1,),
+        "+1 if the servo's counter-clockwise is the joint's positive direction, else -1",
         choices=(1, -1),
     )
     zero_offsets_rad: tuple[float, ...] = parameter(
@@ -192,7 +195,8 @@ class ServosConfig:
         (1,), "position error without output, both directions [0.293 deg]", low=0, high=254
     )
     compliance_slope: tuple[int, ...] = parameter(
-        (32,), "position error over which the output rises to its maximum [0.293 deg]",
+        (32,),
+        "position error over which the output rises to its maximum [0.293 deg]",
         choices=(2, 4, 8, 16, 32, 64, 128),
     )
     punch_raw: tuple[int, ...] = parameter(
@@ -252,23 +256,31 @@ class ControllerConfig:
         high=100.0,
         run_time=True,
     )
-    a_h: float | None = parameter(
-        None, "gain of the H-SCP sub-task (25); default from the case", low=0.0,
+    a_h: float = parameter(
+        None,
+        "gain of the H-SCP sub-task (25); default from the case",
+        low=0.0,
         high=1e12,
         run_time=True,
     )
-    a_b: float | None = parameter(
-        None, "gain of the B-SCP sub-task (27); default from the case", low=0.0,
+    a_b: float = parameter(
+        None,
+        "gain of the B-SCP sub-task (27); default from the case",
+        low=0.0,
         high=1e12,
         run_time=True,
     )
-    a_prime: float | None = parameter(
-        None, "weight of V_b1 in (30); default from the case", low=0.0,
+    a_prime: float = parameter(
+        None,
+        "weight of V_b1 in (30); default from the case",
+        low=0.0,
         high=1e12,
         run_time=True,
     )
-    b_prime: float | None = parameter(
-        None, "weight of d_min in (30) [1/m]; default from the case", low=0.0,
+    b_prime: float = parameter(
+        None,
+        "weight of d_min in (30) [1/m]; default from the case",
+        low=0.0,
         high=1e12,
         run_time=True,
     )

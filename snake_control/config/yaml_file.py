@@ -1,4 +1,4 @@
-"""Reads ROS parameter files the way rcl reads them, without ROS, and with errors that name a field."""
+"""Reads ROS parameter files the way rcl reads them, with errors that name a field."""
 
 from __future__ import annotations
 

@@ -1,7 +1,8 @@
 """The velocity constraints (1)-(3): wheels do not slide sideways, the base stays on the floor.
 
 Rows G(q) q_dot = 0: sideways velocity of each wheeled base link's centre (ascending), then the
-vertical velocity of the first base link's centre and the x and y components of its angular velocity.
+vertical velocity of the first base link's centre and the x and y components of its angular
+velocity.
 """
 
 from __future__ import annotations

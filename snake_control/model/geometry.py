@@ -1,7 +1,7 @@
 """Where every link, joint and wheel of the robot is, for one posture q.
 
-The head part is a spatial chain. All joints of the base part turn about the same axis (Assumption 2),
-so the base part is planar in the frame of its first link, ``base``; that frame needs not be level.
+The head part is a spatial chain. All joints of the base part turn about the same axis
+(Assumption 2), so the base part is planar in the frame of its first link, ``base``, level or not.
 Its origin is the front end of link n_h + 1, where joint n_h turns.
 """
 

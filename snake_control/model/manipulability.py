@@ -28,8 +28,7 @@ def V_h(g: Geometry, k: Kinematics) -> tuple[float, Array]:
     others = np.array([np.prod(np.delete(sigma, i)) for i in range(4)])
     cofactors = (U * others) @ Vt
     weights = np.zeros_like(k.G)
-    wheels = len(s.wheeled)
     # The head block is -G there; |det| has the sign of neither.
-    weights[np.ix_([0, wheels, wheels + 1, wheels + 2], 6 + s.theta_h)] = -cofactors
+    weights[np.ix_(s.head_rows, 6 + s.theta_h)] = -cofactors
     value = float(np.prod(sigma)) * scale
     return value, scale * contracted_gradient(g, weights)

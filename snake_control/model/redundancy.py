@@ -61,7 +61,7 @@ class Kinematics:
 
         Rows: the first base link's wheels (Assumption 5), then the floor.
         """
-        return self.B_bar[np.ix_(self._head_rows, self.s.theta_h)]
+        return self.B_bar[np.ix_(self.s.head_rows, self.s.theta_h)]
 
     @functools.cached_property
     def F_bar(self) -> Array:
@@ -76,7 +76,7 @@ class Kinematics:
         sigma = np.linalg.svd(self.head_block, compute_uv=False)[-1]
         if not sigma > _SINGULAR:
             raise SingularError("B_tilde", float(sigma))
-        F_head = np.linalg.solve(self.head_block, self.A_tilde[self._head_rows])
+        F_head = np.linalg.solve(self.head_block, self.A_tilde[self.s.head_rows])
         # The head block never sees a B-SCP; solve() would leave round-off there.
         F_head[:, 6 + self.s.m_h :] = 0.0
         rows = slice(1, len(self.s.wheeled))
@@ -117,11 +117,6 @@ class Kinematics:
     def sigma_min_A_hat(self) -> float:
         """Smallest singular value of A_hat, whose blocks are A_bar and a unit matrix."""
         return float(min(np.linalg.svd(self.A_bar, compute_uv=False)[-1], 1.0))
-
-    @property
-    def _head_rows(self) -> list[int]:
-        wheels = len(self.s.wheeled)
-        return [0, wheels, wheels + 1, wheels + 2]
 
 
 def kinematics(g: Geometry) -> Kinematics:

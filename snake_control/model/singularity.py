@@ -12,7 +12,9 @@ from snake_control.model.redundancy import Kinematics
 Array = NDArray[np.float64]
 
 
-def log_V_b1(g: Geometry, k: Kinematics, log_V_h_gradient: Array, V_h: float) -> tuple[float, Array]:
+def log_V_b1(
+    g: Geometry, k: Kinematics, log_V_h_gradient: Array, V_h: float
+) -> tuple[float, Array]:
     """Return log V_b1 and its gradient by q.
 
     Without E_tilde or F_bar, which lose all digits on long robots, from the identity

@@ -43,7 +43,7 @@ class Support:
         first, second = self._ends
         p, q = contacts[first], contacts[second]
         edge = (q - p) / math.hypot(*(q - p))
-        # On an edge the normal is exact even at distance 0; beyond a corner it points to the corner.
+        # On an edge its normal is exact even at distance 0; beyond a corner it points there.
         if 0 < self._share < 1:
             normal = np.array([-edge[1], edge[0]])
         else:

@@ -24,6 +24,8 @@ class Structure:
         m_h, m_b, m: numbers of H-SCPs, B-SCPs and all SCPs.
         axes: unit vector of each joint's axis in the frame of the link before it, (n-1, 3).
         wheeled: wheeled base links, counted from the first base link, (n_b - m_b,).
+        head_rows: constraint rows that only head joints enter: the first base link's wheels
+            (Assumption 5) and the floor, (4,).
         scp_h, scp_b: joints that are H-SCPs and B-SCPs.
         theta_h, theta_b: all other joints of head and base; theta_bar is both in this order (9).
         behind: ``behind[k, a]`` is 1.0 if wheeled link k lies behind base joint a,
@@ -40,6 +42,7 @@ class Structure:
     m: int
     axes: Array
     wheeled: Indices
+    head_rows: Indices
     scp_h: Indices
     scp_b: Indices
     theta_h: Indices
@@ -79,6 +82,7 @@ def structure(robot: RobotConfig) -> Structure:
         m=len(scp_h) + len(scp_b),
         axes=np.array([unit[axis] for axis in robot.joint_axes]),
         wheeled=wheeled,
+        head_rows=np.concatenate(([0], len(wheeled) + np.arange(3))),
         scp_h=scp_h,
         scp_b=scp_b,
         theta_h=free[free < n_h],

@@ -94,5 +94,3 @@ class KinematicPlant:
         if array.shape != (self._s.n - 1,) or not np.isfinite(array).all():
             raise ModelError(f"{what}: expected {self._s.n - 1} finite numbers, got {array}")
         return array
-
-

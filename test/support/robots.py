@@ -10,6 +10,7 @@ import numpy as np
 from snake_control.config import RobotConfig
 
 REFERENCE = Path(__file__).parent.parent / "reference"
+CONFIG = Path(__file__).parent.parent.parent / "config"
 
 PAPER = RobotConfig()
 

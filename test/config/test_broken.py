@@ -1,0 +1,142 @@
+"""Every broken configuration gives one error that names the field."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import yaml
+
+from snake_control.config import load
+from snake_control.errors import ConfigError
+from support.robots import CONFIG
+
+PAPER_YAML = CONFIG / "paper_robot.yaml"
+YAW = "yaw"
+PITCH = "pitch"
+PAPER_AXES = [PITCH, YAW, PITCH, YAW, PITCH] + [YAW] * 6
+
+
+def broken(tmp_path: Path, text: str) -> Path:
+    path = tmp_path / "broken.yaml"
+    path.write_text(text)
+    return path
+
+
+def with_shared(tmp_path: Path, group: str, **values: object) -> Path:
+    tree = {"/**": {"ros__parameters": {group: values}}}
+    return broken(tmp_path, yaml.safe_dump(tree, default_flow_style=None))
+
+
+CASES = {
+    # Conditions and Assumptions of the paper.
+    "condition 1": ("robot", {"wheelless_links": [7, 9, 12]}, "wheelless_links", "Condition 1"),
+    "condition 2": (
+        "robot",
+        {"joint_axes": [PITCH] * 5 + [YAW] * 6},
+        "joint_axes",
+        "Condition 2",
+    ),
+    "condition 3": (
+        "robot",
+        {"joint_axes": [PITCH, PITCH, YAW, PITCH, PITCH] + [YAW] * 6},
+        "head_scp_joints",
+        "Condition 3",
+    ),
+    "condition 4, too many": (
+        "robot",
+        {"links": 10, "joint_axes": PAPER_AXES[:9], "wheelless_links": [7, 9]},
+        "wheelless_links",
+        "Condition 4",
+    ),
+    "condition 5": ("robot", {"head_links": 3}, "head_links", "Condition 5"),
+    "assumption 1": (
+        "robot",
+        {"joint_axes": ["roll", *PAPER_AXES[1:]]},
+        "joint_axes",
+        "Assumption 1",
+    ),
+    "assumption 2, base": (
+        "robot",
+        {"joint_axes": [*PAPER_AXES[:-1], PITCH]},
+        "joint_axes",
+        "Assumption 2",
+    ),
+    "assumption 2, neck": (
+        "robot",
+        {"joint_axes": PAPER_AXES[:4] + [YAW] * 7},
+        "joint_axes",
+        "Assumption 2",
+    ),
+    "assumption 5": ("robot", {"wheelless_links": [6, 9]}, "wheelless_links", "Assumption 5"),
+    # Values.
+    "head link without wheels": ("robot", {"wheelless_links": [3]}, "wheelless_links", "link 3"),
+    "same link twice": ("robot", {"wheelless_links": [7, 7]}, "wheelless_links", "once"),
+    "too few axes": ("robot", {"joint_axes": [PITCH, YAW]}, "joint_axes", "11"),
+    "too many H-SCPs": ("robot", {"head_scp_joints": [1, 3]}, "head_scp_joints", "1 joints"),
+    "H-SCP in the base": ("robot", {"head_scp_joints": [7]}, "head_scp_joints", "1 to 5"),
+    "negative length": ("robot", {"half_length_m": -0.034}, "half_length_m", "0.001"),
+    "length as text": ("robot", {"half_length_m": "34 mm"}, "half_length_m", "number"),
+    "links as decimal": ("robot", {"links": 12.0}, "links", "integer"),
+    "masses of some links": ("robot", {"link_mass_kg": [0.1, 0.1]}, "link_mass_kg", "12"),
+    "limits of some joints": ("robot", {"joint_limits_rad": [2.6] * 5}, "joint_limits_rad", "11"),
+    "limit of zero": ("robot", {"joint_limits_rad": [0.0]}, "joint_limits_rad", "more than 0"),
+    "start outside the range": (
+        "robot",
+        {"joint_limits_rad": [0.5]},
+        "start_joint_angles_rad[4]",
+        "joint 5",
+    ),
+    "bounds the wrong way round": (
+        "robot",
+        {"joint_limits_rad": [1.0, -1.0] + [-2.0, 2.0] * 10},
+        "joint_limits_rad",
+        "below",
+    ),
+    "not a number": ("robot", {"wheel_offset_m": float("nan")}, "wheel_offset_m", "finite"),
+    "unknown key": ("robot", {"wheel_less_links": [7]}, "wheel_less_links", "wheelless_links"),
+    "id twice": ("servos", {"ids": [1, 2, 3, 4, 5, 5, 7, 8, 9, 10, 11]}, "ids", "5"),
+    "id out of range": ("servos", {"ids": [*range(1, 11), 254]}, "ids[10]", "252"),
+    "too few ids": ("servos", {"ids": [1, 2, 3]}, "ids", "11"),
+    "direction of 2": ("servos", {"directions": [2]}, "directions[0]", "1, -1"),
+    "unknown mode": ("servos", {"velocity_modes": ["pwm"]}, "velocity_modes[0]", "wheel"),
+    "slope between steps": ("servos", {"compliance_slope": [30]}, "compliance_slope[0]", "32"),
+    "case 4": ("controller", {"case": 4}, "case", "1, 2, 3"),
+    "K too short": ("controller", {"K": [0.4, 0.25, 0.5]}, "K", "6"),
+    "gain on an SCP": ("controller", {"K": [0.4] * 6 + [0.1, 0.0, 0.0, 0.0]}, "K", "SCP"),
+    "negative gain": ("controller", {"a_h": -1.0}, "a_h", "0"),
+}
+
+
+@pytest.mark.parametrize("case", CASES.values(), ids=CASES)
+def test_field_is_named(tmp_path, case):
+    group, values, field, message = case
+    with pytest.raises(ConfigError) as caught:
+        load(PAPER_YAML, with_shared(tmp_path, group, **values))
+    assert caught.value.field == f"{group}.{field}" or caught.value.field.startswith(
+        f"{group}.{field}["
+    )
+    assert message in str(caught.value)
+    assert str(caught.value).startswith(f"{caught.value.field} = ")
+
+
+NODE_CASES = {
+    "unknown baud rate": ("bus_driver", "baud_rate: 123", "baud_rate", "1000000"),
+    "rate as text": ("bus_driver", "rate_hz: fast", "rate_hz", "number"),
+    "no time-out": ("bus_driver", "command_timeout_s: 0.0", "command_timeout_s", "0.02"),
+    "key of another node": ("bus_driver", "mocap_rate_hz: 100.0", "mocap_rate_hz", "unknown"),
+    "negative noise": ("mock_bus", "mocap_position_noise_m: -1.0", "mocap_position_noise_m", "0"),
+    "no bandwidth": ("pose_input", "cutoff_hz: 0.0", "cutoff_hz", "0.1"),
+    "unknown trajectory": ("trajectory_generator", "trajectory: loop", "trajectory", "line"),
+    "empty": ("scp_controller", "rate_hz:", "rate_hz", "value"),
+}
+
+
+@pytest.mark.parametrize("case", NODE_CASES.values(), ids=NODE_CASES)
+def test_field_of_a_node_is_named(tmp_path, case):
+    node, line, field, message = case
+    text = f"/**/{node}:\n  ros__parameters:\n    {line}\n"
+    with pytest.raises(ConfigError) as caught:
+        load(PAPER_YAML, broken(tmp_path, text))
+    assert caught.value.field == field
+    assert message in str(caught.value)

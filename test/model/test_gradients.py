@@ -1,0 +1,91 @@
+"""Analytic gradients against finite differences, over robots of several structures."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from snake_control.model.constraints import constraint_matrix, contracted_gradient
+from snake_control.model.geometry import geometry
+from snake_control.model.manipulability import V_h
+from snake_control.model.redundancy import kinematics
+from snake_control.model.singularity import V_b1, log_V_b1
+from snake_control.model.stability import support
+from support.derivatives import gradient
+from support.robots import ROBOTS, random_q
+
+SEEDS = (1, 2, 3)
+
+
+@pytest.fixture(params=[(name, seed) for name in ROBOTS for seed in SEEDS], ids=str)
+def posture(request):
+    name, seed = request.param
+    return ROBOTS[name], random_q(ROBOTS[name], seed)
+
+
+def relative(found: np.ndarray, expected: np.ndarray) -> float:
+    return float(np.abs(found - expected).max() / np.abs(expected).max())
+
+
+def test_contracted_gradient(posture):
+    robot, q = posture
+    weights = np.random.default_rng(5).normal(size=constraint_matrix(geometry(robot, q)).shape)
+
+    def weighted_sum(x):
+        return float(np.sum(weights * constraint_matrix(geometry(robot, x))))
+
+    found = contracted_gradient(geometry(robot, q), weights)
+    assert relative(found, gradient(weighted_sum, q)) < 1e-8
+
+
+def test_V_h(posture):
+    robot, q = posture
+
+    def value(x):
+        g = geometry(robot, x)
+        return V_h(g, kinematics(g))[0]
+
+    g = geometry(robot, q)
+    found, found_gradient = V_h(g, kinematics(g))
+    assert found == pytest.approx(abs(np.linalg.det(kinematics(g).B_tilde)), rel=1e-9)
+    assert relative(found_gradient, gradient(value, q)) < 1e-6
+
+
+def test_V_b1(posture):
+    robot, q = posture
+
+    def log_value(x):
+        g = geometry(robot, x)
+        k = kinematics(g)
+        value, value_gradient = V_h(g, k)
+        return log_V_b1(g, k, value_gradient / value, value)[0]
+
+    g = geometry(robot, q)
+    k = kinematics(g)
+    v_h, v_h_gradient = V_h(g, k)
+    found, found_gradient = V_b1(g, k, v_h, v_h_gradient)
+    if robot.links < 20:
+        direct = np.linalg.det(k.E_tilde @ k.E_tilde.T)
+        assert found == pytest.approx(direct, rel=1e-6)
+    # A larger step than elsewhere: on long robots log V_b1 itself carries round-off.
+    assert relative(found_gradient / found, gradient(log_value, q, h=1e-3)) < 1e-6
+
+
+def test_d_min(posture):
+    robot, q = posture
+
+    def value(x):
+        return support(geometry(robot, x)).d_min
+
+    found = support(geometry(robot, q)).gradient
+    assert relative(found, gradient(value, q, h=1e-6)) < 1e-6
+
+
+def test_V_h_gradient_at_a_singular_head_is_finite():
+    """All head joints straight up and down: the head block has no inverse, its cofactors exist."""
+    robot = ROBOTS["paper"]
+    q = np.zeros(robot.links + 5)
+    g = geometry(robot, q)
+    value, value_gradient = V_h(g, kinematics(g))
+    assert value == pytest.approx(0.0, abs=1e-18)
+    assert np.isfinite(value_gradient).all()

@@ -1,0 +1,105 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial import ConvexHull
+
+from snake_control.model.floor import GRAVITY_M_S2, base_pose, gravity_efforts, head_pose_on_floor
+from snake_control.model.geometry import geometry, link_centers, wheel_contacts
+from snake_control.model.stability import convex_hull, support
+from support.derivatives import gradient
+from support.robots import PAPER, ROBOTS, random_q
+
+
+@given(st.integers(0, 10_000), st.integers(3, 40))
+def test_hull_against_qhull(seed, count):
+    points = np.random.default_rng(seed).normal(size=(count, 2))
+    found = convex_hull(points)
+    expected = ConvexHull(points).vertices
+    assert set(found) == set(expected)
+    corners = points[found]
+    following = np.roll(corners, -1, axis=0)
+    area = np.sum(corners[:, 0] * following[:, 1] - corners[:, 1] * following[:, 0])
+    assert area > 0, "counter-clockwise"
+
+
+def test_straight_robot():
+    """Straight on the floor: the polygon is a rectangle, P_G on its axis."""
+    q = np.zeros(17)
+    q[2] = PAPER.wheel_radius_m
+    found = support(geometry(PAPER, q))
+    half = PAPER.half_length_m
+    front, back = -11 * half, -23 * half
+    expected = {(front, 0.032), (front, -0.032), (back, 0.032), (back, -0.032)}
+    assert {tuple(np.round(p, 12)) for p in found.polygon} == {
+        tuple(np.round(p, 12)) for p in expected
+    }
+    np.testing.assert_allclose(found.center_of_mass, [-12 * half, 0.0], atol=1e-12)
+    assert found.d_min == pytest.approx(min(half, 0.032))
+
+
+def test_head_held_far_out_tips():
+    """A head stretched out sideways carries P_G out of the polygon: d_min is negative."""
+    axes = ("yaw", "pitch", "yaw", "pitch", "pitch") + ("yaw",) * 6
+    robot = PAPER.__class__(joint_axes=axes, link_mass_kg=(1.0,) * 5 + (0.01,) * 7)
+    q = np.zeros(17)
+    q[2] = robot.wheel_radius_m
+    found = support(geometry(robot, q))
+    assert found.d_min < 0
+    contacts = wheel_contacts(geometry(robot, q)).reshape(-1, 2)
+    front = contacts[:, 0].max()
+    assert found.d_min == pytest.approx(-(found.center_of_mass[0] - front))
+
+    def value(x):
+        return support(geometry(robot, x)).d_min
+
+    bent = q + np.random.default_rng(0).uniform(-0.1, 0.1, 17)
+    np.testing.assert_allclose(
+        support(geometry(robot, bent)).gradient, gradient(value, bent, 1e-6), atol=1e-8
+    )
+
+
+def test_distance_beyond_a_corner():
+    """Outside, beyond a corner, the nearest edge is met at that corner."""
+    axes = ("yaw", "pitch", "yaw", "yaw", "pitch") + ("yaw",) * 6
+    robot = PAPER.__class__(joint_axes=axes, link_mass_kg=(5.0,) * 5 + (0.01,) * 7)
+    q = np.zeros(17)
+    q[2] = robot.wheel_radius_m
+    q[6:10] = (0.0, 0.0, -0.8, -0.8)
+    # The base's heading is what joint angles add up to, seen from the head at yaw 0.
+    found = support(geometry(robot, q))
+    contacts = wheel_contacts(geometry(robot, q)).reshape(-1, 2)
+    nearest = np.linalg.norm(contacts - found.center_of_mass, axis=1).min()
+    assert found.d_min == pytest.approx(-nearest)
+
+    def value(x):
+        return support(geometry(robot, x)).d_min
+
+    np.testing.assert_allclose(found.gradient, gradient(value, q, 1e-6), atol=1e-8)
+
+
+@pytest.mark.parametrize("robot", list(ROBOTS.values()), ids=list(ROBOTS))
+def test_gravity_efforts_are_the_gradient_of_potential_energy(robot):
+    phi = random_q(robot, 9)[6:]
+    base = np.array([0.3, -0.2, 0.7])
+
+    def energy(angles):
+        w = head_pose_on_floor(robot, angles, base)
+        heights = link_centers(geometry(robot, np.concatenate((w, angles))))[:, 2]
+        return GRAVITY_M_S2 * float(np.dot(robot.link_mass_kg, heights))
+
+    g = geometry(robot, np.concatenate((head_pose_on_floor(robot, phi, base), phi)))
+    np.testing.assert_allclose(gravity_efforts(g), gradient(energy, phi), atol=1e-9)
+    np.testing.assert_allclose(base_pose(g), base, atol=1e-12)
+    # Level at wheel height, as the floor demands.
+    np.testing.assert_allclose(g.base_rotation[:, 2], [0, 0, 1], atol=1e-12)
+    assert g.base_origin[2] == pytest.approx(robot.wheel_radius_m)
+
+
+def test_neck_torque_of_the_paper_robot():
+    """0.42 to 0.53 N m at the neck's foot, a good third of an AX-12's stall torque."""
+    phi = np.array(PAPER.start_joint_angles_rad)
+    g = geometry(PAPER, np.concatenate((head_pose_on_floor(PAPER, phi, np.zeros(3)), phi)))
+    assert 0.3 < abs(gravity_efforts(g)[4]) < 0.6
