@@ -42,7 +42,7 @@ case "$lacking" in
   4) echo "Python $version cannot make virtual environments; install it: sudo apt install python$version-venv" ;;
   5) echo "The C headers of Python $version are missing; install them: sudo apt install python$version-dev" ;;
   *) if [ -n "${PYTHON:-}" ]; then
-       echo "PYTHON=$PYTHON is no Python 3.11, 3.12 or 3.13 that runs; install one: sudo apt install python3 python3-venv python3-dev"
+       echo "PYTHON=$PYTHON does not run as Python 3.11, 3.12 or 3.13; install one: sudo apt install python3 python3-venv python3-dev"
      else
        echo "No Python 3.11, 3.12 or 3.13 found; install one: sudo apt install python3 python3-venv python3-dev (or give PYTHON=path)"
      fi ;;
