@@ -29,8 +29,11 @@ class BusDriverConfig:
         10, "missed reads in a row after which a servo counts as lost", low=1, high=1000
     )
     look_ahead_s: float = parameter(
-        0.15, "how far ahead of the joint its goal is kept, as time at its speed [s]",
-        low=0.04, high=1.0,
+        0.15,
+        "how far ahead of the joint its goal is kept, as time at its speed [s]; margin and slope "
+        "of its compliance are added",
+        low=0.04,
+        high=1.0,
     )
     acceleration_limit_rad_s2: float = parameter(
         0.0, "limit of the change of commanded speed, 0 for none [rad/s^2]", low=0.0, high=1e4
@@ -41,11 +44,26 @@ class BusDriverConfig:
     torque_off_on_exit: bool = parameter(
         False, "switch torque off when the node ends (a raised head then falls)"
     )
+    feedback_timeout_s: float = parameter(
+        0.1,
+        "while the reading of any joint is older, joint_states is not published [s]",
+        low=0.01,
+        high=10.0,
+    )
     diagnostics_period_s: float = parameter(1.0, "period of /diagnostics [s]", low=0.1, high=60.0)
     temperature_warn_c: float = parameter(60.0, "warn from this temperature [degC]", low=0.0)
     voltage_low_warn_v: float = parameter(9.5, "warn below this voltage [V]", low=0.0)
     voltage_high_warn_v: float = parameter(12.6, "warn above this voltage [V]", low=0.0)
     autostart: bool = parameter(True, "configure and activate without a lifecycle manager")
+
+    def __post_init__(self) -> None:
+        if self.look_ahead_s * self.rate_hz < 2.0:
+            raise ConfigError(
+                "look_ahead_s",
+                self.look_ahead_s,
+                f"at least two bus cycles, {2.0 / self.rate_hz:g} s at rate_hz = "
+                f"{self.rate_hz:g}, or joints pause between two goals",
+            )
 
 
 @dataclasses.dataclass(frozen=True)
@@ -87,11 +105,13 @@ class TrajectoryGeneratorConfig:
     rate_hz: float = parameter(50.0, "references per second", low=1.0, high=500.0)
     frame_id: str = parameter("world", "frame of the references")
     trajectory: str = parameter(
-        "line", "what ~/start follows: line, or hold (stay where the head is)",
+        "line",
+        "what ~/start follows: line, or hold (stay where the head is)",
         choices=("line", "hold"),
     )
     start_from: str = parameter(
-        "given", "given: the line starts at start_pose; head: it starts where the head is",
+        "given",
+        "given: the line starts at start_pose; head: it starts where the head is",
         choices=("given", "head"),
     )
     start_pose: tuple[float, ...] = parameter(
@@ -106,12 +126,16 @@ class TrajectoryGeneratorConfig:
     )
     autostart: bool = parameter(False, "start as soon as the head pose is known")
     head_timeout_s: float = parameter(
-        0.1, "a motion that starts where the head is needs a head pose this fresh [s]",
-        low=0.02, high=1.0,
+        0.1,
+        "a motion that starts where the head is needs a head pose this fresh [s]",
+        low=0.02,
+        high=1.0,
     )
     cmd_vel_timeout_s: float = parameter(
-        0.5, "without cmd_vel this fresh the teleoperated head is brought to rest [s]",
-        low=0.05, high=10.0,
+        0.5,
+        "without cmd_vel this fresh the teleoperated head is brought to rest [s]",
+        low=0.05,
+        high=10.0,
     )
     max_linear_speed_m_s: float = parameter(
         0.05, "cmd_vel is limited to this speed [m/s]", low=1e-4, high=10.0
@@ -141,7 +165,15 @@ class MockBusConfig:
         "/tmp/snake_control_mock_bus", "symbolic link to the serial port that the mock opens"
     )
     seed: int = parameter(0, "seed of all random numbers", low=0)
-    step_hz: float = parameter(500.0, "simulation steps per second", low=50.0, high=10000.0)
+    baud_rate: int = parameter(
+        1000000, "rate that every servo listens at [bit/s]", choices=SDK_BAUD_RATES
+    )
+    step_hz: float = parameter(200.0, "simulation steps per second", low=50.0, high=10000.0)
+    held_until_torque_on: bool = parameter(
+        True,
+        "keep the body as it starts, as a hand or a stand would, until the first servo gets "
+        "torque; without, a raised head sinks until the driver is there",
+    )
     frame_id: str = parameter("world", "frame of the motion capture")
     mocap_rate_hz: float = parameter(100.0, "motion capture poses per second", low=1.0, high=1000.0)
     mocap_position_noise_m: float = parameter(
@@ -156,7 +188,7 @@ class MockBusConfig:
     return_delay_raw: int = parameter(
         250, "Return Delay Time of every servo at power-on [2 us]", low=0, high=254
     )
-    supply_voltage_v: float = parameter(11.1, "supply voltage [V]", low=0.0, high=30.0)
+    supply_voltage_v: float = parameter(11.1, "supply voltage [V]", low=0.0, high=25.5)
     stall_torque_nm: float = parameter(1.5, "stall torque at 12 V [N m]", low=0.01, high=100.0)
     no_load_speed_rad_s: float = parameter(
         6.18, "no-load speed at 12 V [rad/s]", low=0.1, high=100.0
@@ -165,6 +197,18 @@ class MockBusConfig:
         60.0, "largest acceleration of a servo [rad/s^2]", low=0.1, high=1e5
     )
     friction_torque_nm: float = parameter(
-        0.1, "torque that gear friction holds at rest [N m]", low=0.0, high=10.0
+        0.1, "friction of the gear, less than the stall torque [N m]", low=0.0, high=10.0
     )
     wire_time: bool = parameter(True, "let bytes take the time that the baud rate says")
+
+    def __post_init__(self) -> None:
+        if self.mocap_rate_hz > self.step_hz:
+            raise ConfigError(
+                "mocap_rate_hz", self.mocap_rate_hz, f"at most step_hz = {self.step_hz:g}"
+            )
+        if self.friction_torque_nm >= self.stall_torque_nm:
+            raise ConfigError(
+                "friction_torque_nm",
+                self.friction_torque_nm,
+                f"less than stall_torque_nm = {self.stall_torque_nm:g}",
+            )

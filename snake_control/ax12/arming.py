@@ -1,0 +1,140 @@
+"""Switching torque on without a jump: goal = where the joint is, settings, then torque.
+
+The RAM area is lost at a power cycle: torque off, Moving Speed 0 (full speed), compliance at its
+defaults. So everything that matters is written each time, and read back, before torque is on.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+from snake_control.ax12 import control_table as ct
+from snake_control.ax12.bus import Bus
+from snake_control.ax12.joint import WHEEL_MODE, JointSetup
+from snake_control.ax12.startup import ServoInfo
+from snake_control.ax12.units import MAX_TICKS, ticks_to_rad
+from snake_control.ax12.velocity import SEED_SPEED_RAW
+from snake_control.errors import ServoError
+
+_RAM = ct.TORQUE_ENABLE.address
+_RAM_LENGTH = ct.TABLE_END - _RAM
+_WATCHED = ct.TORQUE_LIMIT.end - _RAM
+
+
+@dataclasses.dataclass(frozen=True)
+class Seed:
+    """Where one joint starts to be held.
+
+    Attributes:
+        goal_ticks: goal written; 0 in wheel mode, where none is.
+        angle: the same as servo angle [rad].
+    """
+
+    goal_ticks: int
+    angle: float
+
+
+def arm(bus: Bus, joints: Sequence[JointSetup], servos: Sequence[ServoInfo]) -> tuple[Seed, ...]:
+    """Seed every goal from the present position, write the RAM settings, switch torque on.
+
+    Torque goes on only when all servos took their settings; if one refuses torque, it is taken
+    from all again.
+
+    Raises:
+        ServoError: all findings; no torque was switched on, or it is off again.
+        BusError: the port failed.
+    """
+    findings: list[str] = []
+    seeds: list[Seed] = []
+    for joint, servo in zip(joints, servos, strict=True):
+        try:
+            seeds.append(_seed(bus, joint, servo))
+        except ServoError as error:
+            findings.extend(f"{joint}: {text}" for text in error.findings)
+    if findings:
+        raise ServoError(findings)
+    for joint in joints:
+        try:
+            bus.write_verified(joint.servo_id, ct.TORQUE_ENABLE.address, b"\x01")
+        except ServoError as error:
+            findings.extend(f"{joint}: no torque: {text}" for text in error.findings)
+    if findings:
+        disarm(bus, joints)
+        raise ServoError(findings)
+    return tuple(seeds)
+
+
+def disarm(bus: Bus, joints: Sequence[JointSetup]) -> None:
+    """Take the torque from all servos: twice by SYNC_WRITE, which needs no reply.
+
+    Wheel-mode servos are stopped before: they may turn by Moving Speed alone.
+    """
+    wheels = {joint.servo_id: b"\x00\x00" for joint in joints if joint.mode == WHEEL_MODE}
+    for _ in range(2):
+        if wheels:
+            bus.sync_write(ct.MOVING_SPEED.address, wheels)
+        bus.sync_write(ct.TORQUE_ENABLE.address, {joint.servo_id: b"\x00" for joint in joints})
+
+
+def check_armed(bus: Bus, joint: JointSetup, servo: ServoInfo) -> str:
+    """Return what is wrong with an armed servo's RAM, empty if nothing or if it did not answer.
+
+    A servo that lost power for a moment answers as before but has lost torque and settings; after
+    an alarm its torque limit is 0.
+    """
+    reply = bus.read(joint.servo_id, _RAM, _WATCHED, retries=0)
+    if reply is None:
+        return ""
+    if ct.TORQUE_LIMIT.decode(reply.data, _RAM) == 0:
+        return "torque limit is 0: it switched itself off after an alarm"
+    if ct.TORQUE_ENABLE.decode(reply.data, _RAM) == 0:
+        return "torque is off: an alarm, or its power failed for a moment"
+    if reply.data[2:6] != _compliance(joint):
+        return "its settings are gone: did its power fail for a moment?"
+    return ""
+
+
+def _seed(bus: Bus, joint: JointSetup, servo: ServoInfo) -> Seed:
+    before = bus.read(joint.servo_id, _RAM, _RAM_LENGTH)
+    if before is None:
+        raise ServoError(["does not answer"])
+    torque_limit = min(joint.torque_limit_raw, servo.max_torque_raw)
+    if joint.mode == WHEEL_MODE:
+        goal = 0
+        motion = ct.MOVING_SPEED.encode(0) + ct.TORQUE_LIMIT.encode(torque_limit)
+        address = ct.MOVING_SPEED.address
+        bus.write_verified(joint.servo_id, ct.CW_COMPLIANCE_MARGIN.address, _compliance(joint))
+    else:
+        goal = _goal_to_hold(joint, servo, before.data)
+        motion = _compliance(joint) + ct.GOAL_POSITION.encode(goal)
+        motion += ct.MOVING_SPEED.encode(SEED_SPEED_RAW) + ct.TORQUE_LIMIT.encode(torque_limit)
+        address = ct.CW_COMPLIANCE_MARGIN.address
+    # One packet: the goal must not be in force with a speed or a compliance not meant for it.
+    bus.write_verified(joint.servo_id, address, motion)
+    bus.write_verified(joint.servo_id, ct.PUNCH.address, ct.PUNCH.encode(joint.punch_raw))
+    return Seed(goal, ticks_to_rad(goal) if joint.mode != WHEEL_MODE else 0.0)
+
+
+def _goal_to_hold(joint: JointSetup, servo: ServoInfo, ram: bytes) -> int:
+    position = ct.PRESENT_POSITION.decode(ram, _RAM)
+    if position > MAX_TICKS:
+        raise ServoError([f"reports position {position}, which does not exist"])
+    goal = ct.GOAL_POSITION.decode(ram, _RAM)
+    held = ct.TORQUE_ENABLE.decode(ram, _RAM) and not ct.PRESENT_SPEED.decode(ram, _RAM)
+    if held and abs(goal - position) <= joint.compliance_ticks:
+        # It holds already, a droop away from its goal; goal = position would let it sag once more.
+        position = goal
+    if not servo.goal_allowed(position):
+        raise ServoError(
+            [
+                f"stands at {joint.to_joint(ticks_to_rad(position)):.3f} rad, outside its servo's "
+                "angle limits, where it cannot be held: turn it inside by hand with torque off"
+            ]
+        )
+    return position
+
+
+def _compliance(joint: JointSetup) -> bytes:
+    margin, slope = joint.margin_ticks, joint.slope_raw
+    return bytes((margin, margin, slope, slope))

@@ -1,0 +1,209 @@
+"""Instructions of Protocol 1.0 to servos, through dynamixel_sdk, with replies checked in full.
+
+The SDK does not compare a reply's length with the request, so a short or an echoed packet would
+pass for data; here a reply counts only if it is as long as asked. A reply that does not come is
+a value (``None``), not an exception: the caller decides how many misses matter.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import threading
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from typing import NamedTuple
+
+from dynamixel_sdk import (
+    BROADCAST_ID,
+    COMM_RX_CORRUPT,
+    COMM_RX_TIMEOUT,
+    COMM_SUCCESS,
+    GroupSyncWrite,
+    PacketHandler,
+)
+
+from snake_control.ax12.port import PORT_FAILURES, SerialPort
+from snake_control.ax12.units import REFUSED_BITS, error_names
+from snake_control.errors import BusError, ServoError
+
+_PING, _READ, _WRITE = 1, 2, 3
+# FF FF id length error | parameters | checksum; length counts error, parameters and checksum.
+_LENGTH_INDEX, _ERROR_INDEX, _PARAMETERS = 3, 4, 5
+
+
+class Reply(NamedTuple):
+    """A status packet: its parameters and its error bits."""
+
+    data: bytes
+    error_bits: int
+
+
+@dataclasses.dataclass
+class Counters:
+    """What became of the reads of one servo; a retry that succeeds is a retry, not a miss."""
+
+    replies: int = 0
+    retries: int = 0
+    misses: int = 0
+    corrupt_replies: int = 0
+    misses_in_row: int = 0
+
+
+class Bus:
+    """The servos on one port. For one thread at a time.
+
+    Attributes:
+        counters: by servo id; an entry appears with the first read.
+        echoes: how many "replies" were the sent packet itself.
+    """
+
+    def __init__(self, port: SerialPort, retries: int = 1) -> None:
+        self._port = port
+        self._packets = PacketHandler(1.0)
+        self._retries = retries
+        self._groups: dict[tuple[int, int], GroupSyncWrite] = {}
+        self._owner: int | None = None
+        self.counters: dict[int, Counters] = {}
+        self.echoes = 0
+
+    def reset_counters(self) -> None:
+        """Begin counting anew."""
+        self.counters.clear()
+
+    def close(self) -> None:
+        """Close the port."""
+        self._port.close()
+
+    def ping(self, servo_id: int, retries: int | None = None) -> Reply | None:
+        """Ask whether a servo is there; ``None`` if nothing answered.
+
+        Raises:
+            BusError: the port failed (so do all methods).
+        """
+        return self._ask(servo_id, _PING, (), 0, retries)
+
+    def read(
+        self, servo_id: int, address: int, length: int, retries: int | None = None
+    ) -> Reply | None:
+        """Read ``length`` bytes from ``address``; ``None`` if no complete reply came.
+
+        Args:
+            retries: how often to ask again; default as given to the constructor.
+        """
+        return self._ask(servo_id, _READ, (address, length), length, retries)
+
+    def write(self, servo_id: int, address: int, data: bytes) -> Reply | None:
+        """Write ``data`` and return the acknowledgement, ``None`` if none came."""
+        return self._ask(servo_id, _WRITE, (address, *data), 0, None)
+
+    def write_verified(self, servo_id: int, address: int, data: bytes) -> None:
+        """Write ``data``, read it back and compare.
+
+        Raises:
+            ServoError: refused, not acknowledged and not there, or read back otherwise.
+        """
+        acknowledged = self.write(servo_id, address, data)
+        if acknowledged is not None and acknowledged.error_bits & REFUSED_BITS:
+            names = ", ".join(error_names(acknowledged.error_bits & REFUSED_BITS))
+            raise ServoError(
+                [f"servo id {servo_id} refused {list(data)} at address {address}: {names} error"]
+            )
+        # One byte is never read alone: an error status without data could pass for it.
+        length = max(2, len(data))
+        present = self.read(servo_id, address, length)
+        if present is None:
+            raise ServoError([f"servo id {servo_id} does not answer at address {address}"])
+        if present.data[: len(data)] != data:
+            raise ServoError(
+                [
+                    f"servo id {servo_id} holds {list(present.data[: len(data)])} at address "
+                    f"{address} instead of {list(data)}"
+                ]
+            )
+
+    def sync_write(self, address: int, values: Mapping[int, bytes]) -> None:
+        """Write the same registers of several servos in one packet; servos do not reply to it.
+
+        Args:
+            values: bytes by servo id, all of one length.
+
+        Raises:
+            ValueError: different lengths, or none.
+        """
+        lengths = {len(data) for data in values.values()}
+        if len(lengths) != 1:
+            raise ValueError(f"give bytes of one length for each servo, not {sorted(lengths)}")
+        length = lengths.pop()
+        with self._port_use():
+            group = self._groups.setdefault(
+                (address, length), GroupSyncWrite(self._port, self._packets, address, length)
+            )
+            group.clearParam()
+            for servo_id, data in values.items():
+                group.addParam(servo_id, list(data))
+            result = group.txPacket()
+        if result != COMM_SUCCESS:
+            raise BusError(f"sync write failed: {self._packets.getTxRxResult(result)}")
+
+    def _ask(
+        self,
+        servo_id: int,
+        instruction: int,
+        parameters: tuple[int, ...],
+        reply_length: int,
+        retries: int | None,
+    ) -> Reply | None:
+        if not 0 <= servo_id < BROADCAST_ID:
+            raise ValueError(f"no servo id: {servo_id}")
+        counters = self.counters.setdefault(servo_id, Counters())
+        retries = self._retries if retries is None else retries
+        for attempt in range(1 + retries):
+            if attempt:
+                counters.retries += 1
+            reply = self._transact(counters, servo_id, instruction, parameters, reply_length)
+            if reply is not None:
+                counters.replies += 1
+                counters.misses_in_row = 0
+                return reply
+        counters.misses += 1
+        counters.misses_in_row += 1
+        return None
+
+    def _transact(
+        self,
+        counters: Counters,
+        servo_id: int,
+        instruction: int,
+        parameters: tuple[int, ...],
+        reply_length: int,
+    ) -> Reply | None:
+        sent = [0, 0, servo_id, len(parameters) + 2, instruction, *parameters, 0]
+        with self._port_use():
+            received, result, _ = self._packets.txRxPacket(self._port, sent)
+        if result == COMM_RX_TIMEOUT:
+            return None
+        if result not in (COMM_SUCCESS, COMM_RX_CORRUPT):
+            raise BusError(f"instruction failed: {self._packets.getTxRxResult(result)}")
+        # A ping's echo looks like a reply with the voltage error bit; the READ after it tells.
+        if received == sent and instruction != _PING:
+            self.echoes += 1
+        elif result == COMM_SUCCESS and received[_LENGTH_INDEX] == reply_length + 2:
+            data = bytes(received[_PARAMETERS : _PARAMETERS + reply_length])
+            return Reply(data, received[_ERROR_INDEX])
+        counters.corrupt_replies += 1
+        return None
+
+    @contextmanager
+    def _port_use(self) -> Iterator[None]:
+        thread = threading.get_ident()
+        if self._owner is not None and self._owner != thread:
+            raise RuntimeError("two threads use one bus")
+        self._owner = thread
+        try:
+            yield
+        except PORT_FAILURES as error:
+            raise BusError(f"{self._port.port_name} stopped working: {error}") from error
+        finally:
+            self._owner = None
+            # The SDK leaves it set when an exception passes, and then refuses every packet.
+            self._port.is_using = False

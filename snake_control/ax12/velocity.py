@@ -1,0 +1,277 @@
+"""Velocity of one servo, made from what an AX-12 offers (manual p. 16-18; e-manual AX-12A).
+
+Joint mode. The servo moves at Moving Speed (0.111 rpm a unit, 0 means full speed) to Goal Position
+and holds it. Per servo there is a setpoint x_s, an angle:
+
+* The speed is quantised by sigma-delta: each cycle sends a whole number of units, and the
+  remainder, weighted with the time it was in force, is carried on. So any velocity is realised
+  on average, also below one unit. A cycle in which the number is 0 is a hold cycle.
+* x_s is the integral of what was sent: where the joint should be by now.
+* Moving cycle: the goal is kept one look-ahead in front of the measured joint: margin + slope, in
+  which the servo would reduce its output, and the way of ``look_ahead_s`` at this speed. If the
+  host dies, the joint runs this far and no farther.
+* Hold cycle: the goal is x_s and the speed the last one that moved, never 0. The joint rests a
+  droop away from x_s, where compliance balances gravity; because x_s is not latched anew from the
+  joint, a chain of hold cycles does not creep down.
+* x_s stays within margin + slope of the joint: no long catching up after a joint was blocked.
+* A stop must be short, but must not give the droop away. While the joint rests or creeps (below
+  one unit), the droop x_s - joint is remembered (low pass). At fast motion (from four units) and
+  at the edge to rest, x_s is limited to the joint's extrapolated place + [0 .. droop], widened by
+  one cycle of travel and two ticks. Between one and four units only the wide limit applies, so
+  that velocities that dither about one unit do not lose the droop time and again.
+
+Wheel mode. Moving Speed is output with direction (bit 10), 0 stops, the goal is not used. The same
+sigma-delta applies. Output is no speed: expect less under load, and nothing at very low values.
+
+All angles are servo angles (counter-clockwise from the centre).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import NamedTuple
+
+from snake_control.ax12.units import (
+    MAX_RAW,
+    MAX_TICKS,
+    RAD_PER_TICK,
+    RAD_S_PER_SPEED_UNIT,
+    encode_signed,
+    rad_to_ticks,
+    ticks_to_rad,
+)
+
+SEED_SPEED_RAW = 20
+"""Moving Speed at activation: 0.23 rad/s, so that nothing can jump."""
+
+_FAST_UNITS = 4.0
+_DROOP_TIME_S = 0.3
+_STALE_S = 0.1
+_BAND_TICKS = 2.0
+
+
+class Present(NamedTuple):
+    """A measured angle [rad], its rate [rad/s] and age [s]."""
+
+    angle: float
+    rate: float
+    age: float
+
+    @property
+    def now(self) -> float:
+        """The angle extrapolated to the present time; for a limited time only."""
+        return self.angle + self.rate * min(self.age, _STALE_S)
+
+
+class GoalAndSpeed(NamedTuple):
+    """Register values of one cycle; no goal in wheel mode."""
+
+    goal_ticks: int | None
+    speed_raw: int
+
+
+@dataclasses.dataclass(frozen=True)
+class VelocityLimits:
+    """What bounds one servo's motion.
+
+    Attributes:
+        lower_ticks, upper_ticks: range of goals (joint mode).
+        speed: largest speed [rad/s].
+        acceleration: largest change of the commanded speed [rad/s^2], 0 for none.
+        period: nominal time between two cycles [s].
+        look_ahead: how far the goal is ahead of the joint, as time at its speed [s].
+        compliance_ticks: margin + slope, in which the servo does not move at its speed.
+    """
+
+    lower_ticks: int
+    upper_ticks: int
+    speed: float
+    acceleration: float
+    period: float
+    look_ahead: float
+    compliance_ticks: int
+
+
+class _SigmaDelta:
+    """Whole numbers of units whose average over time is the velocity."""
+
+    def __init__(self, unit: float, period: float) -> None:
+        self._unit = unit
+        self._period = period
+        self._missing = 0.0  # [units * s]
+        self._wanted = 0.0
+        self._sent = 0
+
+    def reset(self) -> None:
+        self._missing = self._wanted = 0.0
+        self._sent = 0
+
+    def elapse(self, dt: float) -> float:
+        """Account for the time since the last number was sent; return the way it made [rad]."""
+        self._missing += (self._wanted - self._sent) * dt
+        self._missing = min(max(self._missing, -self._period), self._period)
+        return self._sent * self._unit * dt
+
+    def next(self, velocity: float) -> int:
+        if velocity == 0.0:
+            self.reset()
+            return 0
+        self._wanted = velocity / self._unit
+        number = round(self._wanted + self._missing / self._period)
+        # Never against the wanted direction, whatever was missing before.
+        number = max(number, 0) if velocity > 0 else min(number, 0)
+        self._sent = min(max(number, -MAX_RAW), MAX_RAW)
+        return self._sent
+
+
+class _Ramp:
+    """Limits speed, and the change of speed if configured."""
+
+    def __init__(self, limits: VelocityLimits) -> None:
+        self._limits = limits
+        self.velocity = 0.0
+
+    def step(self, velocity: float, dt: float) -> float:
+        speed, acceleration = self._limits.speed, self._limits.acceleration
+        velocity = min(max(velocity, -speed), speed)
+        if acceleration > 0.0:
+            change = acceleration * dt
+            velocity = min(max(velocity, self.velocity - change), self.velocity + change)
+        self.velocity = velocity
+        return velocity
+
+
+class JointModeVelocity:
+    """Velocity of one servo in joint mode.
+
+    Attributes:
+        setpoint: x_s [rad].
+    """
+
+    def __init__(self, limits: VelocityLimits) -> None:
+        self.setpoint = 0.0
+        self._limits = limits
+        self._ramp = _Ramp(limits)
+        self._units = _SigmaDelta(RAD_S_PER_SPEED_UNIT, limits.period)
+        self._compliance = limits.compliance_ticks * RAD_PER_TICK
+        self._lower = ticks_to_rad(limits.lower_ticks)
+        self._upper = ticks_to_rad(limits.upper_ticks)
+        self._velocity = 0.0
+        self._speed_raw = SEED_SPEED_RAW
+        self._droop = 0.0
+
+    def latch(self, angle: float) -> GoalAndSpeed:
+        """Start holding ``angle`` [rad] at the low speed of activation."""
+        self.setpoint = angle
+        self._ramp.velocity = self._velocity = 0.0
+        self._units.reset()
+        self._speed_raw = SEED_SPEED_RAW
+        self._droop = 0.0
+        return self._hold()
+
+    def stop(self, dt: float, present: Present) -> GoalAndSpeed:
+        """Come to rest at once and hold, without the ramp."""
+        self._ramp.velocity = 0.0
+        return self.step(0.0, dt, present)
+
+    def step(self, velocity: float, dt: float, present: Present) -> GoalAndSpeed:
+        """Return what to send for one cycle.
+
+        Args:
+            velocity: wanted from now on [rad/s].
+            dt: time since the previous cycle [s].
+            present: the joint as last measured.
+        """
+        limits = self._limits
+        dt = min(max(dt, 0.0), limits.look_ahead)
+        self._advance(self._units.elapse(dt))
+        velocity = self._ramp.step(velocity, dt)
+        at_end = self._is_outwards(velocity, present)
+        if at_end:
+            # x_s stays at the end: pulled back to the joint, it would set off again at once.
+            velocity = self._ramp.velocity = 0.0
+        elif present.age <= _STALE_S:
+            self._limit_lead(velocity, dt, present)
+        self._velocity = velocity
+        units = self._units.next(velocity)
+        if units == 0:
+            return self._hold()
+        self._speed_raw = abs(units)
+        origin = present.angle if present.age <= _STALE_S else self.setpoint
+        ahead = (
+            self._compliance
+            + RAD_PER_TICK
+            + max(abs(velocity), self._speed_raw * RAD_S_PER_SPEED_UNIT) * limits.look_ahead
+        )
+        return self._send(origin + math.copysign(ahead, velocity))
+
+    def _advance(self, way: float) -> None:
+        # A joint that was turned out of its range by hand is held there, and only let inwards.
+        if way > 0:
+            self.setpoint = min(self.setpoint + way, max(self._upper, self.setpoint))
+        elif way < 0:
+            self.setpoint = max(self.setpoint + way, min(self._lower, self.setpoint))
+
+    def _is_outwards(self, velocity: float, present: Present) -> bool:
+        return (velocity > 0 and max(self.setpoint, present.angle) >= self._upper) or (
+            velocity < 0 and min(self.setpoint, present.angle) <= self._lower
+        )
+
+    def _limit_lead(self, velocity: float, dt: float, present: Present) -> None:
+        here = present.now
+        lead = self.setpoint - here
+        speed = abs(velocity)
+        if speed < RAD_S_PER_SPEED_UNIT and abs(self._velocity) < RAD_S_PER_SPEED_UNIT:
+            self._droop += (lead - self._droop) * min(1.0, dt / _DROOP_TIME_S)
+            self._droop = min(max(self._droop, -self._compliance), self._compliance)
+        stopping = velocity == 0.0 and self._velocity != 0.0
+        if stopping or speed >= _FAST_UNITS * RAD_S_PER_SPEED_UNIT:
+            band = _BAND_TICKS * RAD_PER_TICK + abs(self._velocity) * self._limits.period
+            low, high = min(0.0, self._droop) - band, max(0.0, self._droop) + band
+        elif velocity != 0.0:
+            high = self._compliance + _BAND_TICKS * RAD_PER_TICK
+            low = -high
+        else:
+            return
+        self.setpoint = here + min(max(lead, low), high)
+
+    def _hold(self) -> GoalAndSpeed:
+        return self._send(self.setpoint)
+
+    def _send(self, goal: float) -> GoalAndSpeed:
+        low = min(self._limits.lower_ticks, math.floor(rad_to_ticks(self.setpoint)))
+        high = max(self._limits.upper_ticks, math.ceil(rad_to_ticks(self.setpoint)))
+        ticks = min(max(round(rad_to_ticks(goal)), low, 0), high, MAX_TICKS)
+        return GoalAndSpeed(ticks, self._speed_raw)
+
+
+class WheelModeVelocity:
+    """Velocity of one servo in wheel mode, as a share of its speed without load."""
+
+    def __init__(self, limits: VelocityLimits, no_load_speed: float) -> None:
+        self._ramp = _Ramp(limits)
+        self._longest = limits.look_ahead
+        self._units = _SigmaDelta(no_load_speed / MAX_RAW, limits.period)
+
+    def latch(self, angle: float) -> GoalAndSpeed:
+        """Start at rest; there is no position to hold."""
+        del angle
+        return self._rest()
+
+    def stop(self, dt: float, present: Present) -> GoalAndSpeed:
+        """Come to rest at once."""
+        del dt, present
+        return self._rest()
+
+    def step(self, velocity: float, dt: float, present: Present) -> GoalAndSpeed:
+        """Return what to send for one cycle; arguments as in joint mode."""
+        del present
+        dt = min(max(dt, 0.0), self._longest)
+        self._units.elapse(dt)
+        return GoalAndSpeed(None, encode_signed(self._units.next(self._ramp.step(velocity, dt))))
+
+    def _rest(self) -> GoalAndSpeed:
+        self._ramp.velocity = 0.0
+        self._units.reset()
+        return GoalAndSpeed(None, 0)

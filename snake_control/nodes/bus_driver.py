@@ -1,0 +1,236 @@
+"""Node ``bus_driver``: joint velocities to AX-12 servos, their state to the graph.
+
+Lifecycle: configure opens the port and checks every servo, activate seeds and arms them, deactivate
+lets them hold, cleanup closes the port. With ``autostart`` (default) configure and activate happen
+at start, and a failure ends the process with one message.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.duration import Duration
+from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from snake_interfaces.msg import JointVelocityCommand
+from std_srvs.srv import SetBool, Trigger
+
+from snake_control.ax12.health import HealthLog, Level, Thresholds, Verdict, judge
+from snake_control.errors import SnakeError
+from snake_control.nodes import topics
+from snake_control.nodes.bus_loop import BusLoop, Snapshot
+from snake_control.nodes.bus_messages import (
+    InvalidCommandError,
+    StateMessages,
+    checked_velocities,
+    diagnostics,
+)
+from snake_control.nodes.parameters import NodeParameters
+from snake_control.nodes.process import run
+
+_THREAD_SWITCH_S = 5e-4
+"""A callback may keep the bus thread waiting for the interpreter this long (default 5 ms)."""
+
+_LOG_PERIOD_S = 1.0
+
+
+class BusDriver(LifecycleNode):
+    """The driver as a lifecycle node."""
+
+    def __init__(self) -> None:
+        """Declare parameters, topics and services; with ``autostart``, configure and activate.
+
+        Raises:
+            ConfigError: a parameter.
+            BusError, ServoError: autostart failed; no servo was armed.
+        """
+        super().__init__("bus_driver", automatically_declare_parameters_from_overrides=True)
+        self._config = NodeParameters(self, "bus_driver").config
+        driver, names = self._config.bus_driver, self._config.robot.joint_names
+        self._messages = StateMessages(names, self._config.servos.ids)
+        self._last: Snapshot | None = None
+        self._health = HealthLog()
+        self._failure: SnakeError | None = None
+        self._starting = False
+        self._ignored = 0
+        self._ignored_logged_at = 0.0
+        self._joint_states = self._publisher(topics.JOINT_STATES)
+        self._bus_state = self._publisher(topics.BUS_STATE)
+        self._diagnostics = self._publisher(topics.DIAGNOSTICS)
+        self._loop = BusLoop(
+            self._config, self._publish, self.get_logger().warning, self.get_logger().error
+        )
+        command = topics.JOINT_VELOCITY_COMMAND
+        self.create_subscription(command.type, command.name, self._take_command, command.qos)
+        self._serve(topics.SET_TORQUE, self._set_torque)
+        self._serve(topics.RECOVER, self._recover)
+        self._serve(topics.EMERGENCY_STOP, self._emergency_stop)
+        self._serve(topics.RESET_EMERGENCY_STOP, self._reset_emergency_stop)
+        self.create_timer(driver.diagnostics_period_s, self._publish_diagnostics)
+        if driver.autostart:
+            self._autostart()
+
+    def close(self) -> None:
+        """Hold, switch torque off if configured, close the port."""
+        self._loop.close()
+
+    # Lifecycle.
+
+    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Open the port and check all servos."""
+        return self._attempt(self._loop.open)
+
+    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Seed goals, write RAM settings, switch torque on."""
+        result = self._attempt(self._loop.activate)
+        if result == TransitionCallbackReturn.SUCCESS:
+            return super().on_activate(state)
+        return result
+
+    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Come to rest; the servos go on holding."""
+        self._loop.deactivate()
+        return super().on_deactivate(state)
+
+    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Close the port."""
+        self._loop.close()
+        return TransitionCallbackReturn.SUCCESS
+
+    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Hold and close the port."""
+        self._loop.close()
+        return TransitionCallbackReturn.SUCCESS
+
+    def _attempt(self, action) -> TransitionCallbackReturn:  # type: ignore[no-untyped-def]
+        try:
+            action()
+        except SnakeError as error:
+            self._failure = error
+            if not self._starting:
+                self.get_logger().error(str(error))
+            return TransitionCallbackReturn.FAILURE
+        return TransitionCallbackReturn.SUCCESS
+
+    def _autostart(self) -> None:
+        self._starting = True
+        for transition in (self.trigger_configure, self.trigger_activate):
+            if transition() != TransitionCallbackReturn.SUCCESS:
+                self._loop.close()
+                assert self._failure is not None
+                raise self._failure
+        self._starting = False
+        self.get_logger().info(
+            f"{len(self._config.servos.ids)} servos on {self._config.bus_driver.port}, torque "
+            + ("on" if self._config.bus_driver.torque_on_activate else "off")
+        )
+
+    # Topics in.
+
+    def _take_command(self, message: JointVelocityCommand) -> None:
+        try:
+            velocities, age = checked_velocities(
+                message,
+                self._config.robot.joint_names,
+                self.get_clock().now(),
+                self._config.bus_driver.command_timeout_s,
+            )
+        except InvalidCommandError as error:
+            self._ignore(str(error))
+            return
+        self._loop.command(velocities, age)
+
+    def _ignore(self, why: str) -> None:
+        self._ignored += 1
+        self._loop.refuse_command(f"{why} ({self._ignored} so far)")
+        now = time.monotonic()
+        if now - self._ignored_logged_at >= _LOG_PERIOD_S:
+            self._ignored_logged_at = now
+            self.get_logger().warning(f"command ignored: {why} ({self._ignored} so far)")
+
+    # Topics out.
+
+    def _publish(self, snapshot: Snapshot) -> None:
+        """Publish one cycle; called by the bus thread, which has nothing else to do now."""
+        since = Duration(nanoseconds=int(1e9 * (time.monotonic() - snapshot.read_at)))
+        stamp = (self.get_clock().now() - since).to_msg()
+        oldest = max((reading.age for reading in snapshot.readings), default=float("inf"))
+        if oldest <= self._config.bus_driver.feedback_timeout_s:
+            self._joint_states.publish(self._messages.joint_state(snapshot, stamp))
+        self._bus_state.publish(self._messages.bus_state(snapshot, stamp))
+        self._last = snapshot
+
+    def _publish_diagnostics(self) -> None:
+        snapshot = self._last
+        if snapshot is None:
+            return
+        driver = self._config.bus_driver
+        thresholds = Thresholds(
+            driver.temperature_warn_c,
+            driver.voltage_low_warn_v,
+            driver.voltage_high_warn_v,
+            driver.feedback_timeout_s,
+        )
+        verdicts = [judge(reading, thresholds) for reading in snapshot.readings]
+        self._log_changes(snapshot, verdicts)
+        message: DiagnosticArray = diagnostics(
+            snapshot, verdicts, driver.port, self.get_clock().now().to_msg()
+        )
+        self._diagnostics.publish(message)
+
+    def _log_changes(self, snapshot: Snapshot, verdicts: list[Verdict]) -> None:
+        log = self.get_logger()
+        for level, text in self._health.changes(snapshot.readings, verdicts):
+            if level is Level.OK:
+                log.info(text)
+            elif level is Level.ERROR:
+                log.error(text)
+            else:
+                log.warning(text)
+
+    # Services.
+
+    def _set_torque(
+        self, request: SetBool.Request, response: SetBool.Response
+    ) -> SetBool.Response:
+        done = "torque is on, holding" if request.data else "torque is off"
+        return self._answer(response, lambda: self._loop.set_torque(request.data), done)
+
+    def _recover(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        return self._answer(response, self._loop.recover, "all servos answer and hold")
+
+    def _emergency_stop(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        return self._answer(response, self._loop.emergency_stop, "holding until reset")
+
+    def _reset_emergency_stop(
+        self, _: Trigger.Request, response: Trigger.Response
+    ) -> Trigger.Response:
+        return self._answer(response, self._loop.reset_emergency_stop, "commands are taken again")
+
+    def _answer(self, response, action, done: str):  # type: ignore[no-untyped-def]
+        try:
+            action()
+        except SnakeError as error:
+            response.success, response.message = False, str(error)
+            self.get_logger().error(str(error))
+        else:
+            response.success, response.message = True, done
+            self.get_logger().info(done)
+        return response
+
+    def _publisher(self, topic: topics.Topic):  # type: ignore[no-untyped-def]
+        return self.create_publisher(topic.type, topic.name, topic.qos)
+
+    def _serve(self, service: topics.Service, callback) -> None:  # type: ignore[no-untyped-def]
+        self.create_service(service.type, service.name, callback)
+
+
+def main() -> int:
+    """Run the node; return the exit code."""
+    sys.setswitchinterval(_THREAD_SWITCH_S)
+    return run(BusDriver)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,177 @@
+"""Messages of the bus driver: what goes out, and the check of what comes in."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.time import Time as RosTime
+from sensor_msgs.msg import JointState
+from snake_interfaces.msg import BusState, JointVelocityCommand, ServoState
+
+from snake_control.ax12.chain import JointReading
+from snake_control.ax12.health import Level, Verdict
+from snake_control.ax12.units import error_names
+from snake_control.nodes.bus_loop import Snapshot, State
+
+_STATE_LEVELS = {
+    State.STOPPED: Level.ERROR,
+    State.EMERGENCY_STOP: Level.WARN,
+    State.TORQUE_OFF: Level.WARN,
+}
+
+
+class StateMessages:
+    """joint_states and bus_state, filled anew in each cycle (made once: that costs less)."""
+
+    def __init__(self, joint_names: Sequence[str], servo_ids: Sequence[int]) -> None:
+        self._joint_state = JointState(name=list(joint_names))
+        # The servos infer their load from their own output: no effort, so none is claimed.
+        self._joint_state.effort = [math.nan] * len(joint_names)
+        self._bus_state = BusState(
+            servos=[
+                ServoState(joint=name, id=servo_id, age=math.inf)
+                for name, servo_id in zip(joint_names, servo_ids, strict=True)
+            ]
+        )
+
+    def joint_state(self, snapshot: Snapshot, stamp: Time) -> JointState:
+        """Return angles and velocities of all joints."""
+        message = self._joint_state
+        message.header.stamp = stamp
+        message.position = [reading.angle for reading in snapshot.readings]
+        message.velocity = [reading.rate for reading in snapshot.readings]
+        return message
+
+    def bus_state(self, snapshot: Snapshot, stamp: Time) -> BusState:
+        """Return the whole state; without a port the servos keep what was last known of them."""
+        message = self._bus_state
+        message.header.stamp = stamp
+        message.state = int(snapshot.state)
+        message.text = snapshot.text
+        message.cycle_time = snapshot.cycle_time
+        message.cycle_rate = snapshot.cycle_rate
+        message.command_age = snapshot.command_age
+        message.cycles = snapshot.cycles
+        message.late_cycles = snapshot.late_cycles
+        for servo, reading in zip(message.servos, snapshot.readings, strict=False):
+            _fill(servo, reading, snapshot.armed)
+        if not snapshot.readings:
+            for servo in message.servos:
+                servo.online = servo.torque_enabled = False
+                servo.age = math.inf
+        return message
+
+
+def _fill(servo: ServoState, reading: JointReading, armed: bool) -> None:
+    servo.online = reading.online
+    servo.torque_enabled = armed
+    servo.error_bits = reading.error_bits
+    servo.position = reading.angle
+    servo.velocity = reading.rate
+    servo.load = reading.load
+    servo.voltage = reading.voltage
+    servo.temperature = reading.temperature
+    servo.age = reading.age
+    servo.replies = reading.counters.replies
+    servo.retries = reading.counters.retries
+    servo.misses = reading.counters.misses
+    servo.corrupt_replies = reading.counters.corrupt_replies
+    servo.invalid_values = reading.invalid_values
+
+
+def diagnostics(
+    snapshot: Snapshot, verdicts: Sequence[Verdict], port: str, stamp: Time
+) -> DiagnosticArray:
+    """Return one status of the bus and one of each servo."""
+    array = DiagnosticArray()
+    array.header.stamp = stamp
+    level = _STATE_LEVELS.get(snapshot.state, Level.OK)
+    array.status = [
+        _status(
+            "bus_driver: bus",
+            port,
+            level,
+            snapshot.text,
+            {
+                "state": snapshot.state.name,
+                "cycle rate [Hz]": f"{snapshot.cycle_rate:.1f}",
+                "cycle time [ms]": f"{1e3 * snapshot.cycle_time:.2f}",
+                "cycles": str(snapshot.cycles),
+                "late cycles": str(snapshot.late_cycles),
+            },
+        )
+    ]
+    for reading, verdict in zip(snapshot.readings, verdicts, strict=True):
+        counters = reading.counters
+        array.status.append(
+            _status(
+                f"bus_driver: {reading.joint.name}",
+                f"AX-12 id {reading.joint.servo_id}",
+                verdict.level,
+                verdict.text,
+                {
+                    "angle [rad]": f"{reading.angle:.3f}",
+                    "load": f"{reading.load:.2f}",
+                    "voltage [V]": f"{reading.voltage:.1f}",
+                    "temperature [degC]": f"{reading.temperature:.0f}",
+                    "errors": ", ".join(error_names(reading.error_bits)) or "none",
+                    "replies": str(counters.replies),
+                    "retries": str(counters.retries),
+                    "misses": str(counters.misses),
+                    "corrupt replies": str(counters.corrupt_replies),
+                    "invalid values": str(reading.invalid_values),
+                },
+            )
+        )
+    return array
+
+
+def _status(
+    name: str, hardware: str, level: Level, text: str, values: dict[str, str]
+) -> DiagnosticStatus:
+    return DiagnosticStatus(
+        level=bytes((level,)),
+        name=name,
+        message=text,
+        hardware_id=hardware,
+        values=[KeyValue(key=key, value=value) for key, value in values.items()],
+    )
+
+
+class InvalidCommandError(ValueError):
+    """A velocity command that must not be executed; says why."""
+
+
+def checked_velocities(
+    message: JointVelocityCommand, joint_names: Sequence[str], now: RosTime, timeout: float
+) -> tuple[tuple[float, ...], float]:
+    """Return the velocities in joint order [rad/s] and the command's age [s].
+
+    Raises:
+        InvalidCommandError: names are not exactly the joints, lengths differ, a value is not
+            finite, or the stamp is older than ``timeout``, or as far in the future.
+    """
+    names = message.name
+    if len(names) != len(message.velocity):
+        raise InvalidCommandError(f"{len(names)} names but {len(message.velocity)} velocities")
+    values = dict(zip(names, message.velocity, strict=True))
+    if len(values) != len(names):
+        raise InvalidCommandError("a joint is named twice")
+    unknown = sorted(values.keys() - set(joint_names))
+    if unknown:
+        raise InvalidCommandError(f"no such joint: {', '.join(unknown)}")
+    missing = [name for name in joint_names if name not in values]
+    if missing:
+        raise InvalidCommandError(f"missing: {', '.join(missing)}")
+    for name, value in values.items():
+        if not math.isfinite(value):
+            raise InvalidCommandError(f"velocity of {name} is {value}")
+    age = 1e-9 * (now - RosTime.from_msg(message.header.stamp, now.clock_type)).nanoseconds
+    if age > timeout:
+        raise InvalidCommandError(f"its stamp is {age:.2f} s old, more than {timeout:.2f} s")
+    if age < -timeout:
+        raise InvalidCommandError(f"its stamp is {-age:.2f} s ahead: are the clocks in step?")
+    return tuple(values[name] for name in joint_names), max(0.0, age)
