@@ -10,6 +10,7 @@ from rcl_interfaces.msg import (
     FloatingPointRange,
     IntegerRange,
     ParameterDescriptor,
+    ParameterType,
     SetParametersResult,
 )
 from rclpy.node import Node
@@ -25,6 +26,12 @@ from snake_control.config import (
     refuse_unknown,
 )
 from snake_control.errors import ConfigError
+
+_ROS_TYPES = {
+    bool: ParameterType.PARAMETER_BOOL,
+    int: ParameterType.PARAMETER_INTEGER,
+    str: ParameterType.PARAMETER_STRING,
+}
 
 
 class NodeParameters:
@@ -57,14 +64,18 @@ class NodeParameters:
         self._kind = kind
         self._on_change = on_change
         self._known = known_parameters((kind,))
+        self._following_case = False
         given = {n: p.value for n, p in node.get_parameters_by_prefix("").items()}
         # A file may serve all nodes through one /** section.
         known_to_any = known_parameters(
             ("bus_driver", "pose_input", "scp_controller", "trajectory_generator", "mock_bus")
         )
         for name, value in given.items():
-            if not is_ros_parameter(name):
-                refuse_unknown(name, value, known_to_any)
+            if is_ros_parameter(name):
+                continue
+            refuse_unknown(name, value, known_to_any)
+            if name not in self._known:
+                node.undeclare_parameter(name)
         self._explicit = {name: value for name, value in given.items() if name in self._known}
         self.config = from_parameters(kind, self._explicit)
         for name, item in self._known.items():
@@ -92,30 +103,27 @@ class NodeParameters:
 
     def _take_change(self, changed: Iterable[RosParameter]) -> None:
         values = self._ours(changed)
-        # Setting the case makes weights follow that nobody set; those are no explicit values.
-        followers = {n for n, v in values.items() if self._is_follower(n, v)}
-        values = {n: v for n, v in values.items() if n not in followers}
-        if not values:
+        if not values or self._following_case:
             return
         self._explicit |= values
         self.config = from_parameters(self._kind, self._explicit)
         if "controller.case" in values:
-            self._node.set_parameters(
-                [
-                    RosParameter(name, value=self._effective(name))
-                    for name, item in self._known.items()
-                    if item.default is None and name not in self._explicit
-                ]
-            )
+            self._follow_case()
         if self._on_change is not None:
             self._on_change(self.config)
 
-    def _is_follower(self, name: str, value: object) -> bool:
-        return (
-            self._known[name].default is None
-            and name not in self._explicit
-            and value == self._effective(name)
-        )
+    def _follow_case(self) -> None:
+        """Show the weights that the new case sets, without making them explicit ones."""
+        followers = [
+            RosParameter(name, value=self._effective(name))
+            for name, item in self._known.items()
+            if item.default is None and name not in self._explicit
+        ]
+        self._following_case = True
+        try:
+            self._node.set_parameters(followers)
+        finally:
+            self._following_case = False
 
     def _ours(self, changed: Iterable[RosParameter]) -> dict[str, Any]:
         return {p.name: p.value for p in changed if p.name in self._known}
@@ -129,6 +137,8 @@ def _descriptor(item: Parameter) -> ParameterDescriptor:
         # A whole number where a decimal is meant, or one value for a list, is checked by us.
         dynamic_typing=item.kind is float or item.is_list,
     )
+    if not descriptor.dynamic_typing:
+        descriptor.type = _ROS_TYPES[item.kind]
     if item.choices:
         descriptor.additional_constraints = "one of: " + ", ".join(map(str, item.choices))
     elif not item.is_list and item.kind is int and not math.isinf(item.low):

@@ -11,11 +11,12 @@ from typing import Protocol
 
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
 from snake_control.config import load
-from snake_control.errors import SnakeError
+from snake_control.errors import ConfigError, SnakeError
 
 EXIT_BAD_CONFIG = 2
 EXIT_FAILED = 1
@@ -57,8 +58,15 @@ def run(make_node: Callable[[], Node], arguments: Sequence[str] | None = None) -
         print(f"configuration error: {error}", file=sys.stderr)
         return EXIT_BAD_CONFIG
 
-    # rclpy's own handlers would shut the context down before the node can close in order.
-    rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        # rclpy's own handlers would shut the context down before the node can close in order.
+        rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
+    except (
+        rclpy_implementation.RCLInvalidROSArgsError,
+        rclpy_implementation.UnknownROSArgsError,
+    ) as error:
+        print(f"configuration error: {error}", file=sys.stderr)
+        return EXIT_BAD_CONFIG
     node: Node | None = None
     try:
         node = make_node()
@@ -67,6 +75,9 @@ def run(make_node: Callable[[], Node], arguments: Sequence[str] | None = None) -
         while rclpy.ok() and not stop.is_set():
             executor.spin_once(timeout_sec=0.1)
         return 0
+    except ConfigError as error:
+        print(f"configuration error: {error}", file=sys.stderr)
+        return EXIT_BAD_CONFIG
     except SnakeError as error:
         print(f"error: {error}", file=sys.stderr)
         return EXIT_FAILED

@@ -1,0 +1,230 @@
+"""Between messages and the arrays of the other rooms.
+
+Whatever comes in is checked here: a ``MessageError`` says what is wrong with a message.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from builtin_interfaces.msg import Time
+from geometry_msgs.msg import Point, Pose, Quaternion, TwistStamped, Vector3
+from nav_msgs.msg import Odometry
+from numpy.typing import NDArray
+from sensor_msgs.msg import JointState
+from snake_interfaces.msg import HeadReference
+from std_msgs.msg import Header
+
+from snake_control.control.head_filter import QUATERNION_TOLERANCE, HeadEstimate
+from snake_control.control.reference import Reference
+from snake_control.errors import SnakeError
+from snake_control.model.rotation import (
+    quaternion_from_rpy,
+    rotation_from_rpy,
+    rpy_from_quaternion,
+    rpy_rate_map,
+)
+from snake_control.trajectory.teleop import HeadVelocityCommand
+
+Array = NDArray[np.float64]
+
+HEAD_FRAME = "link_1"
+
+# Nearer to a pitch of +-90 degrees the rates of roll and yaw mean nothing.
+_COS_PITCH_MIN = 1e-3
+
+
+class MessageError(SnakeError, ValueError):
+    """A message that cannot be used; the text says why, without the topic's name."""
+
+
+def header(stamp_ns: int, frame_id: str = "") -> Header:
+    """Return a header; time in nanoseconds of the node's clock."""
+    seconds, nanoseconds = divmod(stamp_ns, 1_000_000_000)
+    return Header(stamp=Time(sec=seconds, nanosec=nanoseconds), frame_id=frame_id)
+
+
+def stamp_ns(message: Any) -> int:
+    """Return the stamp of a message with a header [ns]."""
+    stamp = message.header.stamp
+    return int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)
+
+
+def array(value: Point | Vector3 | Quaternion) -> Array:
+    """Return x, y, z (and w of a quaternion) as an array."""
+    values = [value.x, value.y, value.z]
+    if isinstance(value, Quaternion):
+        values.append(value.w)
+    return np.array(values)
+
+
+def vector(values: Sequence[float] | Array) -> Vector3:
+    """Return three numbers as a message."""
+    x, y, z = (float(v) for v in values)
+    return Vector3(x=x, y=y, z=z)
+
+
+def point(values: Sequence[float] | Array) -> Point:
+    """Return three numbers as a message."""
+    x, y, z = (float(v) for v in values)
+    return Point(x=x, y=y, z=z)
+
+
+def quaternion(values: Sequence[float] | Array) -> Quaternion:
+    """Return [x, y, z, w] as a message."""
+    x, y, z, w = (float(v) for v in values)
+    return Quaternion(x=x, y=y, z=z, w=w)
+
+
+def pose_message(w: Array) -> Pose:
+    """Return [x, y, z, R, P, Y] as a message."""
+    return Pose(position=point(w[:3]), orientation=quaternion(quaternion_from_rpy(w[3:])))
+
+
+def pose_array(pose: Pose) -> Array:
+    """Return a pose as [x, y, z, R, P, Y], shape (6,) [m, rad].
+
+    Raises:
+        MessageError: not finite, or the quaternion is not of length 1.
+    """
+    position, xyzw = array(pose.position), array(pose.orientation)
+    require_finite("position", position)
+    require_finite("orientation", xyzw)
+    norm = float(np.linalg.norm(xyzw))
+    if abs(norm - 1.0) > QUATERNION_TOLERANCE:
+        raise MessageError(f"its quaternion has length {norm:.3g}, it must be 1")
+    return np.concatenate([position, rpy_from_quaternion(xyzw)])
+
+
+def rpy_rates(rpy: Array, angular_velocity: Array) -> Array:
+    """Return the rates of R, P, Y that an angular velocity in the world means.
+
+    Args:
+        rpy: roll, pitch, yaw, shape (3,) [rad].
+        angular_velocity: in the world, shape (3,) [rad/s].
+
+    Raises:
+        MessageError: at a pitch of +-90 degrees there are none.
+    """
+    if abs(math.cos(rpy[1])) < _COS_PITCH_MIN:
+        raise MessageError(f"pitch is {rpy[1]:.4f} rad: roll and yaw have no rates there")
+    return np.linalg.solve(rpy_rate_map(rpy), angular_velocity)
+
+
+def odometry_message(estimate: HeadEstimate, frame_id: str, child_frame_id: str) -> Odometry:
+    """Return a filtered head motion as a message: pose in the world, twist in the head's frame."""
+    to_head = estimate.rotation.inv()
+    message = Odometry(header=header(estimate.stamp_ns, frame_id), child_frame_id=child_frame_id)
+    message.pose.pose.position = point(estimate.position)
+    message.pose.pose.orientation = quaternion(estimate.rotation.as_quat())
+    message.twist.twist.linear = vector(to_head.apply(estimate.velocity))
+    message.twist.twist.angular = vector(to_head.apply(estimate.angular_velocity))
+    return message
+
+
+def head_motion(message: Odometry, frame_id: str) -> tuple[Array, Array]:
+    """Return w and its rate, shape (6,) each, from a message with the twist in the head's frame.
+
+    Raises:
+        MessageError: another frame than ``frame_id``, not finite, no rotation.
+    """
+    require_frame(message, frame_id)
+    w = pose_array(message.pose.pose)
+    linear, angular = array(message.twist.twist.linear), array(message.twist.twist.angular)
+    require_finite("twist", linear, angular)
+    rotation = rotation_from_rpy(w[3:])
+    return w, np.concatenate([rotation @ linear, rpy_rates(w[3:], rotation @ angular)])
+
+
+def reference_message(reference: Reference, stamp: int, frame_id: str) -> HeadReference:
+    """Return a reference for the time ``stamp`` [ns] as a message, twist in ``frame_id``."""
+    message = HeadReference(
+        header=header(stamp, frame_id), pose=pose_message(reference.w_d)
+    )
+    message.twist.linear = vector(reference.w_d_dot[:3])
+    message.twist.angular = vector(rpy_rate_map(reference.w_d[3:]) @ reference.w_d_dot[3:])
+    return message
+
+
+def reference_from(message: HeadReference, frame_id: str) -> Reference:
+    """Return the reference in a message.
+
+    Raises:
+        MessageError: another frame than ``frame_id``, not finite, no rotation.
+    """
+    require_frame(message, frame_id)
+    w_d = pose_array(message.pose)
+    linear, angular = array(message.twist.linear), array(message.twist.angular)
+    require_finite("twist", linear, angular)
+    return Reference(w_d, np.concatenate([linear, rpy_rates(w_d[3:], angular)]))
+
+
+def joint_motion(message: JointState, names: Sequence[str]) -> tuple[Array, Array]:
+    """Return angles and velocities of the named joints, in that order, shape (n-1,) each.
+
+    Velocities that a message does not have are 0.
+
+    Raises:
+        MessageError: a joint is missing or twice there, lengths differ, or a value is not finite.
+    """
+    given = list(message.name)
+    if len(message.position) != len(given):
+        raise MessageError(f"{len(given)} names but {len(message.position)} positions")
+    if len(message.velocity) not in (0, len(given)):
+        raise MessageError(f"{len(given)} names but {len(message.velocity)} velocities")
+    missing = [name for name in names if name not in given]
+    if missing:
+        raise MessageError(f"{', '.join(missing)} missing")
+    doubled = [name for name in names if given.count(name) > 1]
+    if doubled:
+        raise MessageError(f"{', '.join(doubled)} given twice")
+    order = [given.index(name) for name in names]
+    phi = np.array([message.position[i] for i in order])
+    phi_dot = np.array([message.velocity[i] for i in order]) if message.velocity else 0.0 * phi
+    for what, values in (("position", phi), ("velocity", phi_dot)):
+        for name, value in zip(names, values, strict=True):
+            if not math.isfinite(value):
+                raise MessageError(f"{what} of {name} is {value}")
+    return phi, phi_dot
+
+
+def head_velocity_command(
+    message: TwistStamped, stamp: float, world_frame_id: str
+) -> HeadVelocityCommand:
+    """Return a velocity command for the head.
+
+    ``header.frame_id`` says in which frame both linear and angular velocity are: empty or
+    ``world_frame_id`` for the world, ``link_1`` for the level frame that has the head's yaw.
+
+    Args:
+        message: the command.
+        stamp: when it was given [s], on the clock of the trajectory.
+        world_frame_id: name of the world frame.
+
+    Raises:
+        MessageError: another frame, or not finite.
+    """
+    frame = message.header.frame_id
+    if frame not in ("", world_frame_id, HEAD_FRAME):
+        raise MessageError(
+            f"its frame is '{frame}'; allowed: '{world_frame_id}' (or empty) or '{HEAD_FRAME}'"
+        )
+    linear, angular = array(message.twist.linear), array(message.twist.angular)
+    require_finite("twist", linear, angular)
+    return HeadVelocityCommand(stamp, linear, angular, in_heading_frame=frame == HEAD_FRAME)
+
+
+def require_frame(message: Any, frame_id: str) -> None:
+    """Raise ``MessageError`` unless the message is given in ``frame_id``."""
+    if message.header.frame_id != frame_id:
+        raise MessageError(f"its frame is '{message.header.frame_id}', expected '{frame_id}'")
+
+
+def require_finite(what: str, *values: Array) -> None:
+    """Raise ``MessageError`` naming ``what`` unless all values are finite."""
+    for value in values:
+        if not np.isfinite(value).all():
+            raise MessageError(f"its {what} is not finite: {value.tolist()}")

@@ -1,0 +1,86 @@
+"""The newest message of one topic, and whether it can be relied on."""
+
+from __future__ import annotations
+
+import dataclasses
+import enum
+import math
+from collections.abc import Callable
+from typing import Any, Generic, TypeVar
+
+from snake_control.nodes.conversions import MessageError, stamp_ns
+
+Value = TypeVar("Value")
+
+
+class Fault(enum.IntEnum):
+    """What can be wrong with an input; the worst has the highest number."""
+
+    WAITING = 1
+    STALE = 2
+    INVALID = 3
+
+
+@dataclasses.dataclass(frozen=True)
+class Problem:
+    """Why an input cannot be used; the text names it."""
+
+    fault: Fault
+    text: str
+
+
+class Input(Generic[Value]):
+    """Keeps the newest message of a topic in converted form; its age is judged by its stamp."""
+
+    def __init__(self, name: str, timeout_s: float, convert: Callable[[Any], Value]) -> None:
+        """Create an input that has received nothing.
+
+        Args:
+            name: the topic, for texts.
+            timeout_s: older (or further in the future) than this is no use.
+            convert: turns a message into a value, or raises ``MessageError``.
+        """
+        self.name = name
+        self._timeout_s = timeout_s
+        self._convert = convert
+        self._stamp_ns: int | None = None
+        self._value: Value | None = None
+        self._fault = ""
+
+    def receive(self, message: Any) -> None:
+        """Take a message (the callback of a subscription)."""
+        self._stamp_ns = stamp_ns(message)
+        try:
+            self._value = self._convert(message)
+            self._fault = ""
+        except MessageError as error:
+            self._value = None
+            self._fault = str(error)
+
+    @property
+    def value(self) -> Value:
+        """The newest value; only after ``problem`` returned ``None``."""
+        assert self._value is not None
+        return self._value
+
+    def age(self, now_ns: int) -> float:
+        """Age of the newest message [s]; infinite before the first."""
+        return math.inf if self._stamp_ns is None else (now_ns - self._stamp_ns) * 1e-9
+
+    def problem(self, now_ns: int) -> Problem | None:
+        """Return why the newest message cannot be used at ``now_ns``, ``None`` if it can."""
+        if self._stamp_ns is None:
+            return Problem(Fault.WAITING, f"waiting for {self.name}")
+        if self._fault:
+            return Problem(Fault.INVALID, f"{self.name}: {self._fault}")
+        age = self.age(now_ns)
+        if age < -self._timeout_s:
+            # It would look fresh for as long as the clocks differ.
+            return Problem(
+                Fault.INVALID, f"{self.name}: stamped {-age:.2f} s ahead of this computer's clock"
+            )
+        if age > self._timeout_s:
+            return Problem(
+                Fault.STALE, f"{self.name} is {age:.2f} s old (limit {self._timeout_s:g} s)"
+            )
+        return None

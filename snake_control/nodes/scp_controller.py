@@ -1,0 +1,202 @@
+"""Node ``scp_controller``: head pose, joint states and reference in, joint velocities out.
+
+Every step sends a command, zeros unless the reference is tracked, so that the bus driver knows that
+the controller is alive; and a ``controller_state`` with a status that names what is in the way.
+"""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+from numpy.typing import NDArray
+from rclpy.node import Node
+from snake_interfaces.msg import ControllerState
+from std_srvs.srv import SetBool
+
+from snake_control.config import Config
+from snake_control.control.reference import Reference
+from snake_control.control.scp_controller import ScpController
+from snake_control.errors import ModelError, SingularError
+from snake_control.model.rotation import unwrap_near
+from snake_control.nodes import markers, topics
+from snake_control.nodes.controller_messages import (
+    Step,
+    controller_state,
+    judge,
+    velocity_command,
+)
+from snake_control.nodes.conversions import head_motion, joint_motion, reference_from
+from snake_control.nodes.inputs import Fault, Input
+from snake_control.nodes.parameters import NodeParameters
+from snake_control.nodes.process import run
+
+_MARKERS_PERIOD_S = 0.1
+
+_STATUS_OF_FAULT = {
+    Fault.WAITING: ControllerState.STATUS_WAITING,
+    Fault.STALE: ControllerState.STATUS_STALE,
+    Fault.INVALID: ControllerState.STATUS_INVALID,
+}
+_GOOD = (ControllerState.STATUS_TRACKING, ControllerState.STATUS_LIMITED)
+
+
+class ScpControllerNode(Node):
+    """Runs ``ScpController`` at a fixed rate on the newest inputs."""
+
+    def __init__(self) -> None:
+        super().__init__("scp_controller", automatically_declare_parameters_from_overrides=True)
+        config = NodeParameters(self, "scp_controller", self._on_parameters).config
+        self._robot = config.robot
+        self._own = own = config.scp_controller
+        self._case = config.controller.case
+        self._controller = ScpController(config.robot, config.controller)
+        self._enabled = own.enabled
+        self._status: int | None = None
+        self._origin_ns = self.get_clock().now().nanoseconds
+        # Roll, pitch and yaw go on without jumps by whole turns.
+        self._rpy = np.zeros(3)
+        self._rpy_d = np.zeros(3)
+
+        self._joint_states = Input(
+            topics.JOINT_STATES.name,
+            own.joint_states_timeout_s,
+            lambda message: joint_motion(message, self._robot.joint_names),
+        )
+        self._head = Input(
+            topics.HEAD_ODOMETRY.name,
+            own.head_timeout_s,
+            lambda message: head_motion(message, own.frame_id),
+        )
+        self._reference = Input(
+            topics.HEAD_REFERENCE.name,
+            own.reference_timeout_s,
+            lambda message: reference_from(message, own.frame_id),
+        )
+        for topic, source in (
+            (topics.JOINT_STATES, self._joint_states),
+            (topics.HEAD_ODOMETRY, self._head),
+            (topics.HEAD_REFERENCE, self._reference),
+        ):
+            self.create_subscription(topic.type, topic.name, source.receive, topic.qos)
+
+        t = topics.JOINT_VELOCITY_COMMAND
+        self._command = self.create_publisher(t.type, t.name, t.qos)
+        t = topics.CONTROLLER_STATE
+        self._state = self.create_publisher(t.type, t.name, t.qos)
+        t = topics.MARKERS
+        self._markers = self.create_publisher(t.type, t.name, t.qos)
+        self.create_service(topics.ENABLE.type, topics.ENABLE.name, self._on_enable)
+        self.create_timer(1.0 / own.rate_hz, self._on_timer)
+        self.create_timer(_MARKERS_PERIOD_S, self._publish_markers)
+
+    def _on_parameters(self, config: Config) -> None:
+        self._case = config.controller.case
+        self._controller = ScpController(config.robot, config.controller)
+        self.get_logger().info(f"gains changed: {config.controller}")
+
+    def _on_enable(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
+        self._enabled = request.data
+        response.success = True
+        response.message = "enabled" if self._enabled else "disabled: zero velocity"
+        self.get_logger().info(response.message)
+        return response
+
+    def _on_timer(self) -> None:
+        started = time.perf_counter()
+        step = self._step(self.get_clock().now().nanoseconds)
+        self._command.publish(velocity_command(step, self._robot))
+        elapsed = time.perf_counter() - started
+        self._state.publish(
+            controller_state(step, self._robot, self._case, self._own.frame_id, elapsed)
+        )
+        if step.status != self._status:
+            self._status = step.status
+            good = step.status in _GOOD
+            (self.get_logger().info if good else self.get_logger().warning)(step.text)
+
+    def _step(self, now: int) -> Step:
+        step = Step.at(now, self._robot)
+        step.joint_states_age = self._joint_states.age(now)
+        step.head_age = self._head.age(now)
+        step.reference_age = self._reference.age(now)
+        problems = []
+        w_dot = phi_dot = np.zeros(0)
+        if problem := self._head.problem(now):
+            problems.append(problem)
+        else:
+            w, w_dot = self._head.value
+            self._rpy = unwrap_near(w[3:], self._rpy)
+            step.w = np.concatenate([w[:3], self._rpy])
+        if problem := self._joint_states.problem(now):
+            problems.append(problem)
+        else:
+            step.phi, phi_dot = self._joint_states.value
+        if problem := self._reference.problem(now):
+            problems.append(problem)
+        else:
+            reference = self._reference.value
+            self._rpy_d = unwrap_near(reference.w_d[3:], self._rpy_d)
+            step.w_d = np.concatenate([reference.w_d[:3], self._rpy_d])
+            step.w_d_dot = reference.w_d_dot
+
+        if not self._enabled:
+            step.status = ControllerState.STATUS_DISABLED
+            step.text = f"disabled by ~/{topics.ENABLE.name[2:]}"
+        elif problems:
+            step.status = _STATUS_OF_FAULT[max(problem.fault for problem in problems)]
+            step.text = "; ".join(problem.text for problem in problems)
+        else:
+            self._control(step, np.concatenate([w_dot, phi_dot]))
+        return step
+
+    def _control(self, step: Step, q_dot: NDArray[np.float64]) -> None:
+        q = np.concatenate([step.w, step.phi])
+        reference = Reference(step.w_d, step.w_d_dot)
+        t = (step.stamp_ns - self._origin_ns) * 1e-9
+        step.status = ControllerState.STATUS_FAULT
+        try:
+            result = self._controller.step(q, q_dot, reference, t)
+        except (SingularError, ModelError) as error:
+            step.text = str(error)
+            return
+        if not np.isfinite(result.u).all():
+            bad = [
+                name
+                for name, u in zip(self._robot.joint_names, result.u, strict=True)
+                if not np.isfinite(u)
+            ]
+            step.text = f"the control law gave no finite velocity for {', '.join(bad)}"
+            return
+        judge(step, result, self._robot)
+
+    def _publish_markers(self) -> None:
+        if self._markers.get_subscription_count() == 0:
+            return
+        now = self.get_clock().now().nanoseconds
+        frame = self._own.frame_id
+        found = []
+        if not self._head.problem(now) and not self._joint_states.problem(now):
+            q = np.concatenate([self._head.value[0], self._joint_states.value[0]])
+            found += markers.robot_markers(self._robot, q, now, frame)
+        if not self._reference.problem(now):
+            length = 4 * self._robot.half_length_m
+            found.append(
+                markers.reference_marker(self._reference.value.w_d, now, frame, length)
+            )
+        if found:
+            self._markers.publish(markers.marker_array(found))
+
+    def close(self) -> None:
+        """Leave the joints with a command to rest."""
+        now = self.get_clock().now().nanoseconds
+        self._command.publish(velocity_command(Step.at(now, self._robot), self._robot))
+
+
+def main() -> int:
+    """Run the node."""
+    return run(ScpControllerNode)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,170 @@
+"""Node ``trajectory_generator``: sends ``head/reference`` for a trajectory or for ``cmd_vel``.
+
+Nothing is sent before ``~/start`` (or the parameter ``autostart``) or ``cmd_vel``. ``~/stop``, or
+``cmd_vel`` that ceases, brings the reference to rest; then it is no longer sent, and the controller
+reports a stale reference and commands zero. ``cmd_vel`` takes over from whatever is being followed.
+"""
+
+from __future__ import annotations
+
+from geometry_msgs.msg import PoseStamped, TwistStamped
+from nav_msgs.msg import Path
+from numpy import float64
+from numpy.typing import NDArray
+from rclpy.node import Node
+from std_srvs.srv import Trigger
+
+from snake_control.nodes import topics
+from snake_control.nodes.conversions import (
+    MessageError,
+    head_motion,
+    head_velocity_command,
+    header,
+    pose_message,
+    reference_message,
+    stamp_ns,
+)
+from snake_control.nodes.inputs import Input
+from snake_control.nodes.parameters import NodeParameters
+from snake_control.nodes.process import run
+from snake_control.trajectory.sequence import Outcome, ReferenceSequence
+
+# How the planned path of a line is drawn.
+_PATH_POINTS = 61
+_ENDLESS_PATH_S = 60.0
+
+
+class TrajectoryGenerator(Node):
+    """Samples a ``ReferenceSequence`` at a fixed rate."""
+
+    def __init__(self) -> None:
+        super().__init__(
+            "trajectory_generator", automatically_declare_parameters_from_overrides=True
+        )
+        config = NodeParameters(self, "trajectory_generator").config.trajectory_generator
+        self._config = config
+        self._sequence = ReferenceSequence(config)
+        self._autostart = config.autostart
+        self._origin_ns = self.get_clock().now().nanoseconds
+        self._cmd_vel_stamp_ns = 0
+        self._has_path = False
+        self._head = Input(
+            topics.HEAD_ODOMETRY.name,
+            config.head_timeout_s,
+            lambda message: head_motion(message, config.frame_id)[0],
+        )
+
+        t = topics.HEAD_REFERENCE
+        self._reference = self.create_publisher(t.type, t.name, t.qos)
+        t = topics.HEAD_PLANNED_PATH
+        self._path = self.create_publisher(t.type, t.name, t.qos)
+        t = topics.HEAD_ODOMETRY
+        self.create_subscription(t.type, t.name, self._head.receive, t.qos)
+        t = topics.CMD_VEL
+        self.create_subscription(t.type, t.name, self._on_cmd_vel, t.qos)
+        self.create_service(topics.START.type, topics.START.name, self._on_start)
+        self.create_service(topics.STOP.type, topics.STOP.name, self._on_stop)
+        self.create_timer(1.0 / config.rate_hz, self._step)
+
+    def _now(self) -> int:
+        return self.get_clock().now().nanoseconds
+
+    def _seconds(self, time_ns: int) -> float:
+        """Time since the node's start, small enough to keep all digits."""
+        return (time_ns - self._origin_ns) * 1e-9
+
+    def _head_pose(self, now: int) -> NDArray[float64] | None:
+        return None if self._head.problem(now) else self._head.value
+
+    def _step(self) -> None:
+        now = self._now()
+        if self._autostart and self._head_pose(now) is not None:
+            self._start(now)
+        reference = self._sequence.sample(self._seconds(now))
+        if reference is not None:
+            self._reference.publish(reference_message(reference, now, self._config.frame_id))
+            if self._sequence.idle:
+                self.get_logger().info("the head is at rest: no more references")
+
+    def _start(self, now: int) -> Outcome:
+        # A start by hand, or one that cmd_vel made, is not repeated by itself later.
+        self._autostart = False
+        outcome = self._sequence.start(self._seconds(now), self._head_pose(now))
+        if outcome.done:
+            self._publish_path(now)
+        self.get_logger().info(f"start: {outcome.text}")
+        return outcome
+
+    def _on_start(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        outcome = self._start(self._now())
+        response.success, response.message = outcome.done, outcome.text
+        return response
+
+    def _on_stop(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        now = self._now()
+        self._autostart = False
+        outcome = self._sequence.stop(self._seconds(now))
+        self._publish_path(now)
+        self.get_logger().info(f"stop: {outcome.text}")
+        response.success, response.message = outcome.done, outcome.text
+        return response
+
+    def _on_cmd_vel(self, message: TwistStamped) -> None:
+        now = self._now()
+        # What is typed by hand has no stamp, as a rule.
+        stamp = stamp_ns(message) or now
+        age = (now - stamp) * 1e-9
+        limit = self._config.cmd_vel_timeout_s
+        try:
+            if abs(age) > limit:
+                raise MessageError(f"its stamp is {age:.2f} s old (limit {limit:g} s)")
+            if stamp < self._cmd_vel_stamp_ns <= now:
+                raise MessageError("it is older than the one before it")
+            # A stamp in the future must not lengthen the dead-man time-out.
+            t = self._seconds(min(stamp, now))
+            command = head_velocity_command(message, t, self._config.frame_id)
+        except MessageError as error:
+            self._ignore_cmd_vel(str(error))
+            return
+        self._cmd_vel_stamp_ns = stamp
+        was_idle = self._sequence.idle
+        outcome = self._sequence.command(command, self._seconds(now), self._head_pose(now))
+        if not outcome.done:
+            self._ignore_cmd_vel(outcome.text)
+            return
+        self._autostart = False
+        if was_idle:
+            self.get_logger().info(outcome.text)
+        self._publish_path(now)
+
+    def _ignore_cmd_vel(self, reason: str) -> None:
+        self.get_logger().warning(f"cmd_vel ignored: {reason}", throttle_duration_sec=1.0)
+
+    def _publish_path(self, now: int) -> None:
+        """Show the line, or that there is none any more."""
+        line = self._sequence.line
+        if line is None and not self._has_path:
+            return
+        self._has_path = line is not None
+        frame = self._config.frame_id
+        path = Path(header=header(now, frame))
+        if line is not None:
+            path.poses = [
+                PoseStamped(
+                    header=header(self._origin_ns + round(t * 1e9), frame), pose=pose_message(w_d)
+                )
+                for t, w_d in line.path(_PATH_POINTS, _ENDLESS_PATH_S)
+            ]
+        self._path.publish(path)
+
+    def close(self) -> None:
+        """References cease, and the controller then commands zero."""
+
+
+def main() -> int:
+    """Run the node."""
+    return run(TrajectoryGenerator)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
