@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from support.robots import ROBOTS, random_q
 
 from snake_control.config import ControllerConfig
 from snake_control.control.sub_tasks import base_scp_velocities, costs, head_scp_velocities
 from snake_control.model.geometry import geometry
 from snake_control.model.redundancy import joint_velocities, kinematics
+from support.robots import ROBOTS, random_q
 
 ALL = pytest.mark.parametrize("robot", list(ROBOTS.values()), ids=list(ROBOTS))
 GAINS = ControllerConfig(a_h=2.0, a_b=3.0, a_prime=0.0, b_prime=5.0)
