@@ -97,10 +97,11 @@ class PoseInput(Node):
         now = self.get_clock().now().nanoseconds
         status, text = self._judge(now)
         if status != self._published_status:
-            level = self.get_logger().info
+            # Two calls: rclpy holds one line of code to one severity.
             if status in (PoseStatus.STATUS_STALE, PoseStatus.STATUS_INVALID):
-                level = self.get_logger().warning
-            level(f"head pose: {text}")
+                self.get_logger().warning(f"head pose: {text}")
+            else:
+                self.get_logger().info(f"head pose: {text}")
             self._published_status = status
         estimate = self._filter.estimate
         self._status.publish(
