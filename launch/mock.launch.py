@@ -8,7 +8,8 @@ from pathlib import Path
 
 from ament_index_python.packages import get_package_share_directory
 from launch import LaunchDescription
-from launch.actions import DeclareLaunchArgument
+from launch.actions import DeclareLaunchArgument, RegisterEventHandler
+from launch.event_handlers import OnProcessIO
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterFile
@@ -24,6 +25,18 @@ def generate_launch_description() -> LaunchDescription:
         ParameterFile(str(config / "mock.yaml")),
         ParameterFile([str(config / "case_"), LaunchConfiguration("case"), ".yaml"]),
     ]
+    nodes = {
+        name: Node(
+            package="snake_control",
+            executable=name,
+            name=name,
+            namespace=LaunchConfiguration("namespace"),
+            parameters=parameters,
+            output="screen",
+        )
+        for name in NODES
+    }
+    driver = nodes.pop("bus_driver")
     return LaunchDescription(
         [
             DeclareLaunchArgument(
@@ -37,16 +50,14 @@ def generate_launch_description() -> LaunchDescription:
             DeclareLaunchArgument(
                 "namespace", default_value="", description="namespace of this robot"
             ),
-            *(
-                Node(
-                    package="snake_control",
-                    executable=name,
-                    name=name,
-                    namespace=LaunchConfiguration("namespace"),
-                    parameters=parameters,
-                    output="screen",
+            # The driver needs the port, which is there when the mock has said so.
+            RegisterEventHandler(
+                OnProcessIO(
+                    target_action=nodes["mock_bus"],
+                    on_stderr=lambda _: driver,
+                    handle_once=True,
                 )
-                for name in NODES
             ),
+            *nodes.values(),
         ]
     )
