@@ -112,8 +112,11 @@ class ScpControllerNode(Node):
         )
         if step.status != self._status:
             self._status = step.status
-            good = step.status in _GOOD
-            (self.get_logger().info if good else self.get_logger().warning)(step.text)
+            # On lines of their own: rclpy ties one severity to each line that logs.
+            if step.status in _GOOD:
+                self.get_logger().info(step.text)
+            else:
+                self.get_logger().warning(step.text)
 
     def _step(self, now: int) -> Step:
         step = Step.at(now, self._robot)
