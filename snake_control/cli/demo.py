@@ -58,6 +58,10 @@ _BUS_STATES = {
 }
 
 
+# Moving too: the controller commands zeros while it waits for a reference.
+_READY = (BusState.STATE_HOLDING, BusState.STATE_MOVING)
+
+
 class StopRequested(Exception):  # noqa: N818 - not an error: somebody pressed Ctrl-C
     """SIGINT or SIGTERM arrived.
 
@@ -152,11 +156,14 @@ class Demo:
         given = ["--ros-args"]
         for path in self._arguments.all_params_files:
             given += ["--params-file", str(path)]
+        single: dict[str, Any] = {}
         if kind in ("mock_bus", "bus_driver"):
-            given += ["-p", f"port:={self._port}"]
+            single["port"] = self._port
         if kind == "mock_bus":
-            for name, value in self._arguments.mock_parameters.items():
-                given += ["-p", f"{name}:={value}"]
+            single |= self._arguments.mock_parameters
+        for name, value in single.items():
+            # With the node's name: to rcl a file's section of this node outranks a bare -p.
+            given += ["-p", f"{kind}:{name}:={value}"]
         self.processes.start(kind, given)
 
     def _wait_until_ready(self) -> None:
@@ -169,7 +176,7 @@ class Demo:
 
         wait(
             "bus_driver to hold all joints",
-            lambda: _holding(recorder.bus),
+            lambda: recorder.bus is not None and recorder.bus.state in _READY,
             lambda: _bus_text(recorder.bus),
         )
         wait(
@@ -338,10 +345,6 @@ def _write_results(arguments: DemoArguments, config: Config, demo: Demo, outcome
     for path in (arguments.out / "summary.json", arguments.out / "series.csv", *figures):
         print(path)
     print(f"{arguments.out / 'logs'}{os.sep}")
-
-
-def _holding(bus: BusState | None) -> bool:
-    return bus is not None and bus.state == BusState.STATE_HOLDING
 
 
 def _bus_text(bus: BusState | None) -> str:

@@ -70,11 +70,11 @@ def head_pose(series: Series, fell_at_s: float | None) -> Figure:
     grid = figure.subplots(3, 2, sharex=True)
     for i, label in enumerate(_HEAD_LABELS):
         axes = grid[i % 3][i // 3]
-        axes.plot(t, series.w[:, i], color=style.ACTUAL, label="$w$")
+        axes.plot(t, series.w[:, i], color=style.BLUE, label="$w$")
         axes.plot(t, w_d[:, i], "--", color=style.REFERENCE, linewidth=1.1, label="$w_d$")
         _time_axis(axes, t, fell_at_s, last=i % 3 == 2)
         axes.set_ylabel(label)
-        _least_span(axes, 0.01)
+        _least_span(axes, 0.02 if i < 3 else 0.1)
     grid[0][0].legend(loc="upper left", ncols=2)
     figure.align_ylabels(grid[:, 0])
     figure.align_ylabels(grid[:, 1])
@@ -119,7 +119,7 @@ def scps(series: Series, fell_at_s: float | None) -> Figure:
     _joint_lines(upper, t, series.phi, robot.scp_joints, r"\phi")
     _time_axis(upper, t, fell_at_s, last=False)
     upper.set_ylabel(r"$\tilde\phi$ [rad]")
-    lower.plot(t, series.numbers("V_h"), color=style.ACTUAL)
+    lower.plot(t, series.numbers("V_h"), color=style.BLUE)
     _time_axis(lower, t, fell_at_s, last=True)
     lower.set_ylabel("$V_h$")
     lower.ticklabel_format(axis="y", scilimits=(-3, 3))
@@ -134,7 +134,7 @@ def base_costs(series: Series, fell_at_s: float | None) -> Figure:
     figure.suptitle("Distance from singularity and from falling")
     upper, lower = figure.subplots(2, 1, sharex=True)
     V_b1 = series.numbers("V_b1")
-    upper.plot(t, np.where(V_b1 > 0, V_b1, np.nan), color=style.ACTUAL)
+    upper.plot(t, np.where(V_b1 > 0, V_b1, np.nan), color=style.BLUE)
     if (V_b1 > 0).any():
         upper.set_yscale("log")
     _time_axis(upper, t, fell_at_s, last=False)
@@ -143,11 +143,11 @@ def base_costs(series: Series, fell_at_s: float | None) -> Figure:
         lower.plot(
             t,
             1e3 * series.numbers("d_min"),
-            color=style.PALETTE[5],
+            color=style.SKY_BLUE,
             linewidth=1.0,
             label="as the controller measures it",
         )
-    lower.plot(t, 1e3 * series.d_min, color=style.ACTUAL, label="ground truth")
+    lower.plot(t, 1e3 * series.d_min, color=style.BLUE, label="ground truth")
     lower.axhline(0.0, color=style.FALL, linewidth=0.9)
     _time_axis(lower, t, fell_at_s, last=True)
     lower.set_ylabel("$d_{min}$ [mm]")

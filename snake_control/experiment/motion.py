@@ -75,14 +75,14 @@ def snapshot_steps(t: Array, count: int) -> list[int]:
 
 def _paths(axes: Axes, w: Array, w_d: Array, vertical: int) -> None:
     axes.plot(w_d[:, 0], w_d[:, vertical], "--", color=style.REFERENCE, linewidth=0.8, zorder=1.5)
-    axes.plot(w[:, 0], w[:, vertical], color=style.PALETTE[4], linewidth=1.0, zorder=4)
+    axes.plot(w[:, 0], w[:, vertical], color=style.ORANGE, linewidth=1.0, zorder=4)
 
 
 def _from_above(axes: Axes, robot: RobotConfig, q: Array, chain: Array) -> None:
     g = geometry(robot, q)
     stand = support(g)
     axes.add_patch(
-        Polygon(stand.polygon, facecolor="#009E7326", edgecolor="#009E73", linewidth=0.7)
+        Polygon(stand.polygon, facecolor=f"{style.GREEN}26", edgecolor=style.GREEN, linewidth=0.7)
     )
     radius = robot.wheel_radius_m
     for link, pair in zip(robot.wheeled_links, wheel_contacts(g), strict=True):
@@ -92,7 +92,7 @@ def _from_above(axes: Axes, robot: RobotConfig, q: Array, chain: Array) -> None:
             axes.plot(*np.stack((contact - along, contact + along)).T, color="#222222", lw=1.8)
         axes.plot(*pair.T, color="#888888", lw=0.8)
     _chain(axes, robot, chain[:, :2])
-    axes.plot(*stand.center_of_mass, "P", color=style.PALETTE[3], markersize=6, zorder=5)
+    axes.plot(*stand.center_of_mass, "P", color=style.PURPLE, markersize=6, zorder=5)
 
 
 def _from_the_side(axes: Axes, robot: RobotConfig, chain: Array) -> None:
@@ -102,19 +102,24 @@ def _from_the_side(axes: Axes, robot: RobotConfig, chain: Array) -> None:
 
 def _chain(axes: Axes, robot: RobotConfig, points: Array) -> None:
     base = robot.head_links
-    axes.plot(*points[base:].T, "-o", color=style.ACTUAL, markersize=2.6, linewidth=1.8)
-    axes.plot(*points[: base + 1].T, "-o", color=style.SECOND, markersize=2.6, linewidth=1.8)
-    axes.plot(*points[0], "o", color=style.SECOND, markersize=5.0)
+    axes.plot(*points[base:].T, "-o", color=style.BLUE, markersize=2.6, linewidth=1.8)
+    axes.plot(*points[: base + 1].T, "-o", color=style.VERMILION, markersize=2.6, linewidth=1.8)
+    axes.plot(*points[0], "o", color=style.VERMILION, markersize=5.0)
 
 
 def _legend() -> list[Line2D]:
     return [
-        Line2D([], [], color=style.SECOND, marker="o", markersize=4, label="head part"),
-        Line2D([], [], color=style.ACTUAL, marker="o", markersize=3, label="base part"),
+        Line2D([], [], color=style.VERMILION, marker="o", markersize=4, label="head part"),
+        Line2D([], [], color=style.BLUE, marker="o", markersize=3, label="base part"),
         Line2D([], [], color="#222222", linewidth=2, label="wheels"),
         Line2D(
-            [], [], color=style.PALETTE[3], marker="P", linestyle="", label="$P_G$ in its support"
+            [],
+            [],
+            color=style.PURPLE,
+            marker="P",
+            linestyle="",
+            label="$P_G$ in the support polygon",
         ),
-        Line2D([], [], color=style.PALETTE[4], label="path of the head"),
+        Line2D([], [], color=style.ORANGE, label="path of the head"),
         Line2D([], [], color=style.REFERENCE, linestyle="--", label="wanted path"),
     ]

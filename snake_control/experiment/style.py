@@ -9,8 +9,10 @@ import matplotlib
 from matplotlib.axes import Axes
 
 # Okabe and Ito's palette, yellow left out: too pale for lines on white.
-PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
-ACTUAL, SECOND, REFERENCE, FALL = "#0072B2", "#D55E00", "#444444", "#8B0000"
+BLUE, VERMILION, GREEN, PURPLE, ORANGE = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00"
+BLACK, SKY_BLUE = "#000000", "#56B4E9"
+PALETTE = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, BLACK, SKY_BLUE)
+REFERENCE, FALL = "#444444", "#8B0000"
 
 RC: dict[str, Any] = {
     "axes.axisbelow": True,
