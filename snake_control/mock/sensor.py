@@ -29,16 +29,16 @@ class Sensor:
 
     def step(self, angle_rad: float, dt: float) -> None:
         """Let ``dt`` seconds pass with the shaft at an angle."""
-        if _in_dead_zone(_wrapped_ticks(angle_rad)):
+        if not units.in_sensor_range(angle_rad):
             self._since_dead_zone_s = 0.0
         else:
             self._since_dead_zone_s += dt
 
     def position(self, angle_rad: float) -> int:
         """Reading of Present Position; undefined in the 60 degrees without sensor."""
-        ticks = _wrapped_ticks(angle_rad)
-        if _in_dead_zone(ticks):
+        if not units.in_sensor_range(angle_rad):
             return int(self._rng.integers(*_GARBAGE_POSITION))
+        ticks = units.ticks_from_angle(math.remainder(angle_rad, 2 * math.pi))
         return min(max(round(ticks), 0), units.MAX_TICKS)
 
     def speed(self, speed_rad_s: float) -> int:
@@ -46,11 +46,3 @@ class Sensor:
         if self._since_dead_zone_s < _SPEED_MEMORY_S:
             return int(self._rng.integers(*_GARBAGE_SPEED))
         return units.signed_magnitude(speed_rad_s / units.SPEED_UNIT_RAD_S)
-
-
-def _wrapped_ticks(angle_rad: float) -> float:
-    return units.ticks_from_angle(math.remainder(angle_rad, 2 * math.pi))
-
-
-def _in_dead_zone(ticks: float) -> bool:
-    return not -0.5 <= ticks <= units.MAX_TICKS + 0.5

@@ -218,7 +218,8 @@ class Servo:
         # The mode before the write counts, which no block of registers can change with the speed.
         if "moving_speed" in names and self.wheel_mode:
             self._driven = True
-        if "goal_position" in names and self.parameters.goal_enables_torque:
+        enables = self.parameters.goal_enables_torque and not self.wheel_mode
+        if "goal_position" in names and enables:
             self._driven = True
             r["torque_enable"] = 1
         if "torque_limit" in names and r["torque_limit"]:

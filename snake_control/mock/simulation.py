@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Generic, Protocol, TypeVar
 
 import numpy as np
@@ -51,6 +51,10 @@ class Mounting:
     def servo_angle(self, joint_angle_rad: float) -> float:
         """Servo angle at a joint angle [rad]."""
         return self.direction * joint_angle_rad + self.zero_offset_rad
+
+    def joint_angle(self, servo_angle_rad: float) -> float:
+        """Joint angle at a servo angle [rad]."""
+        return self.direction * (servo_angle_rad - self.zero_offset_rad)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -133,7 +137,9 @@ class BodySimulation(Simulation, Generic[State]):
         step_s: float,
         start: float,
         *,
+        steps_per_body_step: int = 1,
         held_until_torque_on: bool = True,
+        on_snapshot: Callable[[Snapshot[State]], None] = lambda _: None,
     ) -> None:
         """Join servos and body.
 
@@ -142,16 +148,25 @@ class BodySimulation(Simulation, Generic[State]):
             mountings: how each sits in its joint.
             body: in the posture that the servos are in.
             initial: its state.
-            step_s: length of a step [s].
+            step_s: length of a servo's step [s].
             start: clock time of that state [s].
+            steps_per_body_step: how many steps of the servos make one of the body, which costs
+                more; their load is constant meanwhile.
             held_until_torque_on: keep the body as it is until the first servo is driven, as a
                 hand or a stand would; a raised head would sink meanwhile.
+            on_snapshot: called with every new state, in the thread that steps.
         """
         super().__init__(servos, step_s, start)
         self._mountings = tuple(mountings)
         if len(self._mountings) != len(self._servos):
             raise ValueError("give one mounting for each servo")
+        if steps_per_body_step < 1:
+            raise ValueError(f"steps_per_body_step = {steps_per_body_step}: give 1 or more")
         self._body = body
+        self._steps_per_body_step = steps_per_body_step
+        self._steps = 0
+        self._at_body_step = self._joint_angles()
+        self._on_snapshot = on_snapshot
         self._held = held_until_torque_on
         self.snapshot = Snapshot(start, initial)
 
@@ -163,20 +178,28 @@ class BodySimulation(Simulation, Generic[State]):
     def _move(self, dt: float) -> None:
         if self._held:
             self._held = not any(servo.driven for servo in self._servos)
+        if not self._held:
+            efforts = self.snapshot.state.effort.tolist()
+            for servo, mounting, effort in zip(self._servos, self._mountings, efforts, strict=True):
+                servo.step(dt, mounting.direction * effort)
+        self._steps += 1
+        if self._steps == self._steps_per_body_step:
+            self._steps = 0
+            self._move_body(dt * self._steps_per_body_step, self._time + dt)
+
+    def _move_body(self, dt: float, time: float) -> None:
         state = self.snapshot.state
         if not self._held:
-            velocities = [
-                _step_joint(servo, mounting, float(effort), dt)
-                for servo, mounting, effort in zip(
-                    self._servos, self._mountings, state.effort, strict=True
-                )
+            angles = self._joint_angles()
+            state = self._body.step((angles - self._at_body_step) / dt, dt)
+            self._at_body_step = angles
+        self.snapshot = Snapshot(time, state)
+        self._on_snapshot(self.snapshot)
+
+    def _joint_angles(self) -> NDArray[np.float64]:
+        return np.array(
+            [
+                mounting.joint_angle(servo.motion.angle_rad)
+                for servo, mounting in zip(self._servos, self._mountings, strict=True)
             ]
-            state = self._body.step(velocities, dt)
-        self.snapshot = Snapshot(self._time + dt, state)
-
-
-def _step_joint(servo: Servo, mounting: Mounting, effort: float, dt: float) -> float:
-    """Move one servo under its joint's effort; return the joint's mean velocity [rad/s]."""
-    before = servo.motion.angle_rad
-    servo.step(dt, mounting.direction * effort)
-    return mounting.direction * (servo.motion.angle_rad - before) / dt
+        )

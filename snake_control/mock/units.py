@@ -34,6 +34,12 @@ def ticks_from_angle(angle_rad: float) -> float:
     return CENTRE_TICKS + angle_rad / TICK_RAD
 
 
+def in_sensor_range(angle_rad: float) -> bool:
+    """Whether the position sensor sees an angle; full turns do not count."""
+    ticks = ticks_from_angle(math.remainder(angle_rad, 2 * math.pi))
+    return -0.5 <= ticks <= MAX_TICKS + 0.5
+
+
 def signed_magnitude(value: float, largest: int = 1023) -> int:
     """Round to a magnitude of 10 bits, with the direction bit for negative (clockwise) values."""
     magnitude = min(round(abs(value)), largest)
