@@ -168,7 +168,10 @@ class MockBusConfig:
     baud_rate: int = parameter(
         1000000, "rate that every servo listens at [bit/s]", choices=SDK_BAUD_RATES
     )
-    step_hz: float = parameter(200.0, "simulation steps per second", low=50.0, high=10000.0)
+    step_hz: float = parameter(200.0, "steps of the servos per second", low=50.0, high=10000.0)
+    steps_per_body_step: int = parameter(
+        2, "steps of the servos for each step of the body, which costs more", low=1, high=100
+    )
     held_until_torque_on: bool = parameter(
         True,
         "keep the body as it starts, as a hand or a stand would, until the first servo gets "
@@ -202,9 +205,12 @@ class MockBusConfig:
     wire_time: bool = parameter(True, "let bytes take the time that the baud rate says")
 
     def __post_init__(self) -> None:
-        if self.mocap_rate_hz > self.step_hz:
+        body_hz = self.step_hz / self.steps_per_body_step
+        if self.mocap_rate_hz > body_hz:
             raise ConfigError(
-                "mocap_rate_hz", self.mocap_rate_hz, f"at most step_hz = {self.step_hz:g}"
+                "mocap_rate_hz",
+                self.mocap_rate_hz,
+                f"at most step_hz / steps_per_body_step = {body_hz:g}",
             )
         if self.friction_torque_nm >= self.stall_torque_nm:
             raise ConfigError(
