@@ -63,7 +63,19 @@ def rpy_rate_map(rpy: ArrayLike) -> Array:
 
 def quaternion_from_rpy(rpy: ArrayLike) -> Array:
     """Return the quaternion [x, y, z, w] of [R, P, Y]."""
-    return Rotation.from_matrix(rotation_from_rpy(rpy)).as_quat()
+    # Of half angles: scipy takes a hundred times as long for one rotation.
+    roll, pitch, yaw = (0.5 * float(angle) for angle in np.asarray(rpy, dtype=float))
+    cr, sr = math.cos(roll), math.sin(roll)
+    cp, sp = math.cos(pitch), math.sin(pitch)
+    cy, sy = math.cos(yaw), math.sin(yaw)
+    return np.array(
+        [
+            sr * cp * cy - cr * sp * sy,
+            cr * sp * cy + sr * cp * sy,
+            cr * cp * sy - sr * sp * cy,
+            cr * cp * cy + sr * sp * sy,
+        ]
+    )
 
 
 def rpy_from_quaternion(quaternion: ArrayLike) -> Array:
