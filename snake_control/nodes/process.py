@@ -86,3 +86,7 @@ def run(make_node: Callable[[], Node], arguments: Sequence[str] | None = None) -
             node.close()  # type: ignore[attr-defined]
             node.destroy_node()
         rclpy.try_shutdown()
+        # A terminal and a launch file may both send one; while Python itself ends, a second
+        # signal would turn an orderly stop into a death by signal.
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)
