@@ -61,7 +61,7 @@ class SerialPort(PortHandler):  # type: ignore[misc]
             raise
         except (*PORT_FAILURES, ValueError) as error:
             self.close()
-            raise BusError(_advice(path, error)) from error
+            raise BusError(advice(path, error)) from error
         self._fd: int = self.ser.fd
         self._lower_latency(path)
 
@@ -151,25 +151,33 @@ class SerialPort(PortHandler):  # type: ignore[misc]
             )
 
 
-def _advice(path: str, error: BaseException) -> str:
-    number = getattr(error, "errno", None)
-    if number is None and error.args and isinstance(error.args[0], int):
-        number = error.args[0]
+def advice(path: str, error: BaseException) -> str:
+    """Return what to do about a port that could not be opened."""
+    number = _error_number(error)
     if number in (errno.ENOENT, errno.ENODEV, errno.ENXIO):
-        advice = (
+        text = (
             "no such port: is the adapter plugged in (ls /dev/serial/by-id), or, without hardware, "
             "does mock_bus run and is its port the same path?"
         )
     elif number in (errno.EACCES, errno.EPERM):
-        advice = (
+        text = (
             "permission denied: add yourself to the group dialout (sudo usermod -aG dialout $USER, "
             'then log in again) or add a udev rule with SUBSYSTEM=="tty", MODE="0666"'
         )
     elif number in (errno.EAGAIN, errno.EBUSY):
-        advice = "in use by another program: stop the other driver or tool first"
+        text = "in use by another program: stop the other driver or tool first"
     elif number in (errno.ENOTTY, errno.EINVAL):
-        advice = "not a serial port"
+        text = "not a serial port"
     else:
-        advice = str(error)
-    return f"cannot open {path}: {advice}"
+        text = str(error)
+    return f"cannot open {path}: {text}"
 
+
+def _error_number(error: BaseException | None) -> int | None:
+    """Return errno of an exception or of its cause; pyserial does not always pass it on."""
+    while error is not None:
+        number = getattr(error, "errno", None) or next(iter(error.args), None)
+        if isinstance(number, int):
+            return number
+        error = error.__context__
+    return None

@@ -20,6 +20,9 @@ and holds it. Per servo there is a setpoint x_s, an angle:
   one cycle of travel and two ticks. Between one and four units only the wide limit applies, so
   that velocities that dither about one unit do not lose the droop time and again.
 
+Limit: goals are whole ticks. A joint that creeps below one unit while it hangs on its compliance
+goes from tick to tick; its average is right over some seconds, not within each.
+
 Wheel mode. Moving Speed is output with direction (bit 10), 0 stops, the goal is not used. The same
 sigma-delta applies. Output is no speed: expect less under load, and nothing at very low values.
 

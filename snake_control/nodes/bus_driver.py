@@ -162,6 +162,7 @@ class BusDriver(LifecycleNode):
         self._last = snapshot
 
     def _publish_diagnostics(self) -> None:
+        self._loop.check()
         snapshot = self._last
         if snapshot is None:
             return

@@ -27,6 +27,8 @@ from snake_control.nodes.bus_schedule import Schedule
 _READ_SHARE = 0.85
 """Part of the period after which reads are left to the next cycle."""
 
+_REQUEST_TIMEOUT_S = 10.0
+
 _HOLD_BURST = 5
 """Cycles of hold before the driver lets go: SYNC_WRITE is not acknowledged."""
 
@@ -140,6 +142,11 @@ class BusLoop:
             self._bus.close()
         self._bus = self._chain = None
 
+    def check(self) -> None:
+        """Raise ``RefusedError`` if the thread ended by itself, which it must not."""
+        if self._thread is not None and not self._thread.is_alive():
+            raise RefusedError("the bus thread ended unexpectedly; its traceback is above")
+
     def command(self, velocities: Sequence[float], age: float) -> None:
         """Take joint velocities [rad/s] that were computed ``age`` seconds ago."""
         self._command = _Command(tuple(velocities), time.monotonic() - age)
@@ -195,7 +202,11 @@ class BusLoop:
             raise RefusedError("the driver is not configured")
         future: Future[None] = Future()
         self._requests.put((action, future))
-        future.result()
+        try:
+            future.result(_REQUEST_TIMEOUT_S)
+        except TimeoutError as error:
+            raise RefusedError(f"not carried out within {_REQUEST_TIMEOUT_S:g} s") from error
+
 
     def _run(self) -> None:
         self._schedule.start(time.monotonic())
