@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections import deque
+from collections.abc import Sequence
 
+import numpy as np
+from numpy.typing import NDArray
 from rclpy.node import Node
 from snake_interfaces.msg import BusState, ControllerState, PlantState, PoseStatus
 
-from snake_control.experiment.series import Series, Step
+from snake_control.experiment.series import Series, Step, pose_error
 from snake_control.experiment.summary import BusTotals
 from snake_control.nodes.topics import BUS_STATE, CONTROLLER_STATE, HEAD_STATUS, PLANT_STATE
+
+Array = NDArray[np.float64]
 
 STATUS_WORDS = {
     ControllerState.STATUS_DISABLED: "disabled",
@@ -24,13 +30,13 @@ STATUS_WORDS = {
 FOLLOWING = (ControllerState.STATUS_TRACKING, ControllerState.STATUS_LIMITED)
 
 _GROUND_TRUTH_WAIT_NS = 500_000_000
-_GROUND_TRUTH_KEPT = 400
+_GROUND_TRUTH_KEPT = 100
 
 
 class Recorder:
     """Subscribes to a robot's state topics and fills a ``Series``.
 
-    Each control step gets the ground truth nearest to its stamp and the latest bus cycle before it.
+    Each control step gets the ground truth at its stamp and the latest bus cycle before it.
     Time zero is the first step that follows a reference after ``start``. Runs in the executor of
     the node it was given; not thread-safe.
 
@@ -69,7 +75,7 @@ class Recorder:
         self._recording = True
 
     def finish(self) -> None:
-        """Stop recording; steps still waiting for their ground truth get the nearest there is."""
+        """Stop recording; steps still waiting for their ground truth get the latest there is."""
         self._join(everything=True)
         self._recording = False
 
@@ -129,17 +135,36 @@ class Recorder:
             if known_until < stamp and not overdue and not everything:
                 return
             self._waiting.popleft()
-            truth = min(self._truth, key=lambda entry: abs(entry[0] - stamp), default=(0, None))
-            near = abs(truth[0] - stamp) <= _GROUND_TRUTH_WAIT_NS
             assert self._zero_ns is not None
-            self.latest = _step(
-                (stamp - self._zero_ns) * 1e-9, controller, bus, truth[1] if near else None
-            )
+            t_s = (stamp - self._zero_ns) * 1e-9
+            self.latest = _step(t_s, controller, bus, _truth_at(stamp, self._truth))
             self._series.append(self.latest)
 
 
+@dataclasses.dataclass(frozen=True)
+class _Truth:
+    w: Array
+    phi: Array
+    nearest: PlantState
+
+
+def _truth_at(stamp: int, states: Sequence[tuple[int, PlantState]]) -> _Truth | None:
+    """Pose and angles between the two ground truths around a stamp, the rest from the nearest."""
+    after = next((i for i, (at, _) in enumerate(states) if at >= stamp), len(states))
+    around = [states[i] for i in (after - 1, after) if 0 <= i < len(states)]
+    around = [entry for entry in around if abs(entry[0] - stamp) <= _GROUND_TRUTH_WAIT_NS]
+    if not around:
+        return None
+    nearest = min(around, key=lambda entry: abs(entry[0] - stamp))[1]
+    (t0, first), (t1, last) = around[0], around[-1]
+    share = (stamp - t0) / (t1 - t0) if t1 > t0 else 0.0
+    w = np.array(first.w) + share * pose_error(last.w, first.w)
+    phi = np.array(first.phi) + share * (np.array(last.phi) - np.array(first.phi))
+    return _Truth(w, phi, nearest)
+
+
 def _step(
-    t_s: float, controller: ControllerState, bus: BusState | None, truth: PlantState | None
+    t_s: float, controller: ControllerState, bus: BusState | None, truth: _Truth | None
 ) -> Step:
     return Step(
         t_s=t_s,
@@ -160,9 +185,9 @@ def _step(
         sigma_min_A_hat=controller.sigma_min_a_hat,
         w=None if truth is None else truth.w,
         phi=None if truth is None else truth.phi,
-        d_min_true=math.nan if truth is None else truth.d_min,
-        fallen=truth is not None and truth.fallen,
-        slip=None if truth is None else truth.slip,
+        d_min_true=math.nan if truth is None else truth.nearest.d_min,
+        fallen=truth is not None and truth.nearest.fallen,
+        slip=None if truth is None else truth.nearest.slip,
         step_time_s=controller.step_time,
         bus_cycle_time_s=math.nan if bus is None else bus.cycle_time,
         bus_rate_hz=math.nan if bus is None else bus.cycle_rate,
