@@ -1,0 +1,207 @@
+"""Cycles of several servos: what is sent in one packet, what becomes of misses and misreadings."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterator
+
+import pytest
+
+from snake_control.ax12.bus import Bus
+from snake_control.ax12.chain import Motion, ServoChain
+from snake_control.ax12.feedback import Feedback
+from snake_control.ax12.health import HealthLog, Level, Thresholds, judge
+from snake_control.ax12.joint import JointSetup
+from snake_control.ax12.port import SerialPort
+from snake_control.ax12.startup import handshake
+from snake_control.ax12.units import RAD_PER_TICK, RAD_S_PER_SPEED_UNIT, ticks_to_rad
+from snake_control.errors import BusError
+from support.scripted_servos import READ, SYNC_WRITE, ScriptedServos, packet
+
+MOTION = Motion(period=0.02, look_ahead=0.15, acceleration=0.0, lost_after_misses=3)
+MODES = {1: "joint", 2: "joint", 3: "wheel"}
+THRESHOLDS = Thresholds(temperature_c=60.0, voltage_low_v=9.5, voltage_high_v=12.6, age_s=0.1)
+
+
+def setup(servo_id: int, mode: str) -> JointSetup:
+    # Joint 2 is mounted the other way round.
+    direction = -1 if servo_id == 2 else 1
+    return JointSetup(
+        f"joint_{servo_id}", servo_id, direction, 0.0, mode, -2.6, 2.6, 5.5, 1, 32, 32, 1.0
+    )
+
+
+JOINTS = tuple(setup(servo_id, mode) for servo_id, mode in MODES.items())
+
+
+@pytest.fixture
+def servos() -> Iterator[ScriptedServos]:
+    with ScriptedServos(MODES) as servos:
+        servos.memory[3][6:10] = bytes(4)
+        yield servos
+
+
+@pytest.fixture
+def chain(servos: ScriptedServos) -> Iterator[ServoChain]:
+    bus = Bus(SerialPort(servos.path, 1000000, reply_timeout_s=0.02), retries=1)
+    found = handshake(bus, JOINTS, (12,))
+    bus.reset_counters()
+    yield ServoChain(bus, JOINTS, found.servos, MOTION, time.monotonic)
+    bus.close()
+
+
+def read(chain: ServoChain, seconds: float = 1.0) -> None:
+    chain.read(time.monotonic() + seconds)
+
+
+def test_goals_and_speeds_of_all_joints_go_out_in_one_packet(
+    chain: ServoChain, servos: ScriptedServos
+) -> None:
+    chain.arm()
+    read(chain)
+    servos.packets.clear()
+    unit = RAD_S_PER_SPEED_UNIT
+    chain.write([10 * unit, 10 * unit, 1.0])
+    read(chain)
+    goals, wheels = servos.instructions(SYNC_WRITE)
+    ahead = 33 + 1 + 10 * unit * 0.15 / RAD_PER_TICK
+    low = round(512 - ahead)
+    high = round(512 + ahead)
+    assert goals == packet(0xFE, 14, 0x83, 30, 4, 1, high % 256, 2, 10, 0, 2, low % 256, 1, 10, 0)
+    assert wheels[2:9] == bytes((0xFE, 7, 0x83, 32, 2, 3, round(1.0 / 6.178 * 1023)))
+    assert [p[4] for p in servos.packets] == [SYNC_WRITE] * 2 + [READ] * 3
+
+
+def test_readings_are_in_the_joints_frame(chain: ServoChain, servos: ScriptedServos) -> None:
+    for servo_id in (1, 2):
+        servos.memory[servo_id][36:44] = bytes((0x64, 2, 20, 0, 0, 6, 105, 44))
+    read(chain)
+    one, two, _ = chain.readings()
+    assert one.angle == pytest.approx(100 * RAD_PER_TICK)
+    assert one.rate == pytest.approx(20 * RAD_S_PER_SPEED_UNIT)
+    assert one.load == pytest.approx(-512 / 1023)
+    assert (two.angle, two.rate, two.load) == (-one.angle, -one.rate, -one.load)
+    assert (one.voltage, one.temperature) == (10.5, 44.0)
+    assert 0.0 <= one.age < 1.0
+
+
+def test_a_missed_reply_keeps_the_last_reading_and_shows_its_age(
+    chain: ServoChain, servos: ScriptedServos
+) -> None:
+    read(chain)
+    servos.answer = lambda i, answer: b"" if i[2] == 2 else answer
+    read(chain)
+    _, two, three = chain.readings()
+    assert two.age > three.age + 0.03
+    assert two.online
+    assert (two.counters.replies, two.counters.retries, two.counters.misses) == (1, 1, 1)
+    assert chain.fault() == ""
+
+
+def test_a_servo_is_lost_after_misses_in_a_row_and_not_asked_again(
+    chain: ServoChain, servos: ScriptedServos
+) -> None:
+    chain.arm()
+    servos.answer = lambda i, answer: b"" if i[2] == 2 else answer
+    for _ in range(3):
+        assert chain.fault() == ""
+        read(chain)
+    assert chain.fault() == "no reply 3 times in a row from joint_2 (servo id 2)"
+    assert [reading.online for reading in chain.readings()] == [True, False, True]
+    servos.packets.clear()
+    read(chain)
+    assert [p[2] for p in servos.instructions(READ)] == [1, 3]
+
+
+def test_dead_servos_cannot_keep_a_cycle_from_ending(
+    chain: ServoChain, servos: ScriptedServos
+) -> None:
+    servos.answer = lambda _, answer: b""
+    read(chain, 0.0)
+    assert {p[2] for p in servos.instructions(READ) if p[5] == 36} == {1}
+    read(chain, 0.0)
+    assert {p[2] for p in servos.instructions(READ) if p[5] == 36} == {1, 2}
+
+
+def test_an_alarm_that_switches_torque_off_is_a_fault(
+    chain: ServoChain, servos: ScriptedServos
+) -> None:
+    chain.arm()
+    servos.error_bits[1] = 1  # voltage: not among the shut-down bits of these servos
+    read(chain)
+    read(chain)
+    assert chain.fault() == ""
+    servos.error_bits[1] = 32
+    read(chain)
+    assert chain.fault() == ""
+    read(chain)
+    assert chain.fault() == "joint_1 (servo id 1) shut down: overload"
+
+
+def test_a_servo_that_lost_power_for_a_moment_is_found(
+    chain: ServoChain, servos: ScriptedServos
+) -> None:
+    chain.arm()
+    servos.memory[2][24] = 0
+    for _ in range(20):
+        read(chain)
+    assert chain.fault().startswith("joint_2 (servo id 2): torque is off")
+
+
+def test_an_unplugged_port_is_a_bus_error(chain: ServoChain, servos: ScriptedServos) -> None:
+    chain.arm()
+    servos.unplug()
+    with pytest.raises(BusError):
+        chain.write(None)
+
+
+@pytest.mark.parametrize(
+    ("position", "speed"), [(1024, 0), (600, 3154), (700, 0)], ids=["range", "speed", "jump"]
+)
+def test_an_unbelievable_reply_is_not_taken(position: int, speed: int) -> None:
+    feedback = Feedback()
+    good = bytes((0, 2, 0, 0, 0, 0, 111, 40))
+    assert feedback.take(good, 0, 1.0)
+    bad = bytes((*position.to_bytes(2, "little"), *speed.to_bytes(2, "little"), 0, 0, 111, 40))
+    assert not feedback.take(bad, 4, 1.02)
+    assert feedback.angle == 0.0
+    assert feedback.read_at == 1.0
+    assert feedback.invalid_values == 1
+    assert feedback.error_bits == 4
+
+
+def test_a_joint_that_was_turned_while_unread_is_believed_again() -> None:
+    feedback = Feedback()
+    feedback.take(bytes((0, 2, 0, 0, 0, 0, 111, 40)), 0, 1.0)
+    moved = bytes((0xBC, 2, 0, 0, 0, 0, 111, 40))
+    assert not feedback.take(moved, 0, 1.02)
+    assert feedback.take(moved, 0, 1.3)
+    assert feedback.angle == pytest.approx(ticks_to_rad(700))
+
+
+def test_judgement_and_its_log(chain: ServoChain, servos: ScriptedServos) -> None:
+    log = HealthLog()
+
+    def look() -> tuple[list[Level], list[tuple[Level, str]]]:
+        read(chain)
+        readings = chain.readings()
+        verdicts = [judge(reading, THRESHOLDS) for reading in readings]
+        return [verdict.level for verdict in verdicts], log.changes(readings, verdicts)
+
+    assert judge(chain.readings()[0], THRESHOLDS).level is Level.STALE
+    assert math.isnan(chain.readings()[0].angle)
+    assert look() == ([Level.OK] * 3, [])
+    servos.memory[1][43] = 65
+    servos.memory[2][42] = 80
+    servos.error_bits[3] = 0x24
+    levels, lines = look()
+    assert levels == [Level.WARN, Level.WARN, Level.ERROR]
+    assert lines == [
+        (Level.WARN, "joint_1 (servo id 1): 65 degC"),
+        (Level.WARN, "joint_2 (servo id 2): 8.0 V"),
+        (Level.ERROR, "joint_3 (servo id 3): reports overheating, overload"),
+    ]
+    assert look()[1] == []
+    servos.memory[1][43] = 40
+    assert look()[1] == [(Level.OK, "joint_1 (servo id 1): OK")]

@@ -1,0 +1,246 @@
+"""The handshake and the way to torque, on servos that are set up wrongly in every way."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+
+import pytest
+
+from snake_control.ax12.arming import arm, check_armed, disarm
+from snake_control.ax12.bus import Bus
+from snake_control.ax12.joint import JointSetup
+from snake_control.ax12.port import SerialPort
+from snake_control.ax12.startup import ServoInfo, cycle_duration, handshake
+from snake_control.ax12.units import RAD_PER_TICK, ticks_to_rad
+from snake_control.errors import ServoError
+from support.scripted_servos import SYNC_WRITE, WRITE, ScriptedServos, packet
+
+MODELS = (12, 18, 300)
+
+
+def joint(servo_id: int, **changes: object) -> JointSetup:
+    setup = JointSetup(
+        name=f"joint_{servo_id}",
+        servo_id=servo_id,
+        direction=1,
+        zero_offset=0.0,
+        mode="joint",
+        lower=-2.6,
+        upper=2.6,
+        speed_limit=5.5,
+        margin_ticks=2,
+        slope_raw=16,
+        punch_raw=40,
+        torque_limit=0.5,
+    )
+    return dataclasses.replace(setup, **changes)  # type: ignore[arg-type]
+
+
+JOINTS = tuple(joint(i) for i in (1, 2, 3))
+
+
+@pytest.fixture
+def servos() -> Iterator[ScriptedServos]:
+    with ScriptedServos([1, 2, 3]) as servos:
+        yield servos
+
+
+@pytest.fixture
+def bus(servos: ScriptedServos) -> Iterator[Bus]:
+    bus = Bus(SerialPort(servos.path, 1000000, reply_timeout_s=0.02), retries=1)
+    yield bus
+    bus.close()
+
+
+def test_a_good_bus_gives_what_the_servos_say(bus: Bus, servos: ScriptedServos) -> None:
+    servos.memory[2][0:2] = (300).to_bytes(2, "little")
+    servos.memory[3][5] = 0
+    found = handshake(bus, JOINTS, MODELS)
+    assert [servo.model for servo in found.servos] == [12, 300, 12]
+    assert [servo.return_delay for servo in found.servos] == [5e-4, 5e-4, 0.0]
+    assert (found.servos[0].lower_ticks, found.servos[0].upper_ticks) == (5, 1019)
+    assert found.warnings == ()
+    assert servos.instructions(WRITE) == []
+    assert servos.instructions(SYNC_WRITE) == []
+
+
+def test_one_message_lists_everything(bus: Bus, servos: ScriptedServos) -> None:
+    del servos.memory[1]
+    servos.memory[2][0] = 29
+    servos.memory[2][16] = 1
+    servos.memory[3][6:10] = bytes(4)
+    with pytest.raises(ServoError) as caught:
+        handshake(bus, JOINTS, MODELS)
+    assert caught.value.findings == [
+        "joint_1 (servo id 1): does not answer",
+        "joint_2 (servo id 2): is model 29, accepted are 12, 18, 300",
+        "joint_2 (servo id 2): does not acknowledge writes: Status Return Level (address 16) is 1, "
+        "set it to 2",
+        "joint_3 (servo id 3): is in wheel mode but configured as joint: set CW Angle Limit "
+        "(address 6) and CCW Angle Limit (address 8) to 0 and 1023 with torque off, or change "
+        "servos.velocity_modes",
+    ]
+    assert all(finding in str(caught.value) for finding in caught.value.findings)
+    assert servos.instructions(WRITE) == []
+    assert servos.instructions(SYNC_WRITE) == []
+
+
+def test_a_silent_bus_gets_a_hint(bus: Bus, servos: ScriptedServos) -> None:
+    servos.memory.clear()
+    with pytest.raises(ServoError, match=r"none of the servos answers.*baud rate"):
+        handshake(bus, JOINTS, MODELS)
+
+
+def test_an_echoing_adapter_is_named(bus: Bus, servos: ScriptedServos) -> None:
+    servos.memory.clear()
+    servos.answer = lambda instruction, _: instruction
+    with pytest.raises(ServoError, match=r"\(echo\)"):
+        handshake(bus, JOINTS, MODELS)
+
+
+def test_two_servos_with_one_id_are_suspected(bus: Bus, servos: ScriptedServos) -> None:
+    servos.answer = lambda i, answer: answer[:5] + b"\x55" if i[2] == 2 else answer
+    with pytest.raises(ServoError, match=r"joint_2 .*two servos"):
+        handshake(bus, JOINTS, MODELS)
+
+
+def test_a_servo_that_answers_only_pings_is_told_apart(bus: Bus, servos: ScriptedServos) -> None:
+    servos.answer = lambda i, answer: b"" if i[2] == 2 and i[4] != 1 else answer
+    with pytest.raises(ServoError, match=r"joint_2 .*answers pings but not reads.*address 16"):
+        handshake(bus, JOINTS, MODELS)
+
+
+def test_a_joint_configured_as_wheel_but_set_up_as_joint(bus: Bus) -> None:
+    joints = (joint(1, mode="wheel"), *JOINTS[1:])
+    with pytest.raises(ServoError, match=r"joint_1 .*in joint mode but configured as wheel"):
+        handshake(bus, joints, MODELS)
+
+
+def test_no_torque_allowed_is_a_finding(bus: Bus, servos: ScriptedServos) -> None:
+    servos.memory[1][14:16] = bytes(2)
+    with pytest.raises(ServoError, match="Max Torque"):
+        handshake(bus, JOINTS, MODELS)
+
+
+def test_angle_limits_narrow_the_range_and_say_so(bus: Bus, servos: ScriptedServos) -> None:
+    servos.memory[1][6:10] = bytes((*(300).to_bytes(2, "little"), *(800).to_bytes(2, "little")))
+    found = handshake(bus, JOINTS, MODELS)
+    assert (found.servos[0].lower_ticks, found.servos[0].upper_ticks) == (300, 800)
+    assert len(found.warnings) == 1
+    assert found.warnings[0].startswith("joint_1 (servo id 1): the servo's angle limits narrow")
+    assert f"{ticks_to_rad(300):.3f}..{ticks_to_rad(800):.3f} rad" in found.warnings[0]
+
+
+def test_limits_with_nothing_in_common_are_a_finding(bus: Bus, servos: ScriptedServos) -> None:
+    servos.memory[1][6:10] = bytes((*(900).to_bytes(2, "little"), *(1000).to_bytes(2, "little")))
+    joints = (joint(1, upper=1.0), *JOINTS[1:])
+    with pytest.raises(ServoError, match="nothing in common"):
+        handshake(bus, joints, MODELS)
+
+
+def test_direction_and_offset_turn_the_range_over() -> None:
+    turned = joint(1, direction=-1, zero_offset=0.5, lower=-1.0, upper=0.2)
+    assert turned.range_ticks[0] == 512 + -(-0.3 // RAD_PER_TICK)
+    assert turned.range_ticks[1] == 512 + 1.5 // RAD_PER_TICK
+    assert turned.to_joint(turned.to_servo(0.123)) == pytest.approx(0.123)
+
+
+def test_the_bus_time_of_eleven_servos_is_the_manuals() -> None:
+    servo = ServoInfo(12, 24, 5e-4, (0, 1023), 0, 1023, 1023, 36)
+    assert cycle_duration([servo] * 11, 1000000) == pytest.approx(8.55e-3, abs=1e-5)
+
+
+def armed(bus: Bus, joints: tuple[JointSetup, ...] = JOINTS) -> tuple[int, ...]:
+    seeds = arm(bus, joints, handshake(bus, joints, MODELS).servos)
+    return tuple(seed.goal_ticks for seed in seeds)
+
+
+def stand_at(servos: ScriptedServos, servo_id: int, ticks: int) -> None:
+    servos.memory[servo_id][36:38] = ticks.to_bytes(2, "little")
+
+
+def test_torque_comes_last_and_goals_are_where_the_joints_are(
+    bus: Bus, servos: ScriptedServos
+) -> None:
+    for servo_id, ticks in ((1, 100), (2, 512), (3, 900)):
+        stand_at(servos, servo_id, ticks)
+    assert armed(bus) == (100, 512, 900)
+    writes = servos.instructions(WRITE)
+    torque = [i for i, write in enumerate(writes) if write[5] == 24]
+    assert torque == list(range(len(writes) - 3, len(writes)))
+    for servo_id, ticks in ((1, 100), (2, 512), (3, 900)):
+        memory = servos.memory[servo_id]
+        assert memory[24] == 1
+        assert tuple(memory[26:30]) == (2, 2, 16, 16)
+        assert int.from_bytes(memory[30:32], "little") == ticks
+        assert 1 <= int.from_bytes(memory[32:34], "little") <= 30
+        assert int.from_bytes(memory[34:36], "little") == 512
+        assert int.from_bytes(memory[48:50], "little") == 40
+    assert all(write[5] >= 24 for write in writes), "EEPROM was written"
+
+
+def test_a_servo_that_holds_already_keeps_its_goal(bus: Bus, servos: ScriptedServos) -> None:
+    """A restarted driver must not let a loaded joint sag by its droop once more."""
+    for servo_id in (1, 2):
+        servos.memory[servo_id][24] = 1
+        servos.memory[servo_id][30:32] = (520).to_bytes(2, "little")
+    servos.memory[2][38] = 5  # moving: its goal is a look-ahead of a driver that died
+    assert armed(bus) == (520, 512, 512)
+
+
+def test_a_servo_outside_its_angle_limits_is_not_armed(bus: Bus, servos: ScriptedServos) -> None:
+    servos.memory[2][6:10] = bytes((*(300).to_bytes(2, "little"), *(800).to_bytes(2, "little")))
+    stand_at(servos, 2, 900)
+    with pytest.raises(ServoError, match=r"joint_2 .*outside its servo's angle limits"):
+        armed(bus)
+    assert [memory[24] for memory in servos.memory.values()] == [0, 0, 0]
+
+
+def test_when_one_refuses_torque_none_keeps_it(bus: Bus, servos: ScriptedServos) -> None:
+    def refuse(instruction: bytes, answer: bytes) -> bytes:
+        if instruction[2] == 3 and instruction[4] == WRITE and instruction[5] == 24:
+            return packet(3, 2, 64)
+        return answer
+
+    servos.answer = refuse
+    with pytest.raises(ServoError, match=r"joint_3 .*no torque.*instruction error"):
+        armed(bus)
+    assert bus.ping(1) is not None
+    assert [memory[24] for memory in servos.memory.values()] == [0, 0, 0]
+
+
+def test_wheels_get_no_goal_and_stand_still(bus: Bus, servos: ScriptedServos) -> None:
+    servos.memory[1][6:10] = bytes(4)
+    servos.memory[1][32:34] = b"\x64\x00"
+    joints = (joint(1, mode="wheel"), *JOINTS[1:])
+    armed(bus, joints)
+    assert servos.memory[1][24] == 1
+    assert servos.memory[1][32:34] == b"\x00\x00"
+    goals = [w for w in servos.instructions(WRITE) if w[2] == 1 and w[5] <= 30 < w[5] + w[3] - 3]
+    assert goals == []
+
+
+def test_disarm_needs_no_replies(bus: Bus, servos: ScriptedServos) -> None:
+    armed(bus)
+    servos.answer = lambda _, answer: b""
+    disarm(bus, JOINTS)
+    servos.answer = None
+    assert bus.ping(1) is not None
+    assert [memory[24] for memory in servos.memory.values()] == [0, 0, 0]
+
+
+@pytest.mark.parametrize(
+    ("address", "value", "words"),
+    [(34, 0, "torque limit is 0"), (24, 0, "torque is off"), (28, 32, "settings are gone")],
+)
+def test_a_servo_that_lost_its_settings_is_found(
+    address: int, value: int, words: str, bus: Bus, servos: ScriptedServos
+) -> None:
+    info = handshake(bus, JOINTS, MODELS).servos[0]
+    arm(bus, JOINTS, handshake(bus, JOINTS, MODELS).servos)
+    assert check_armed(bus, JOINTS[0], info) == ""
+    servos.memory[1][address] = value
+    if address == 34:
+        servos.memory[1][35] = 0
+    assert words in check_armed(bus, JOINTS[0], info)
