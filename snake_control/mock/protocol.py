@@ -84,11 +84,6 @@ class Parser:
     def __init__(self) -> None:
         self._buffer = bytearray()
 
-    @property
-    def pending(self) -> int:
-        """Number of bytes of an unfinished packet."""
-        return len(self._buffer)
-
     def reset(self) -> None:
         """Forget an unfinished packet."""
         self._buffer.clear()

@@ -211,7 +211,8 @@ def _servos(config: Config, mountings: list[Mounting], rngs: list[Generator]) ->
         zip(config.servos.ids, mountings, rngs, strict=True)
     ):
         angle = mounting.servo_angle(starts[i])
-        if not in_sensor_range(angle):
+        # A whole turn away the sensor would see the servo, but at another joint angle.
+        if abs(angle) > math.pi or not in_sensor_range(angle):
             raise ConfigError(
                 f"robot.start_joint_angles_rad[{i}]",
                 starts[i],
