@@ -11,8 +11,9 @@ from snake_control.config import RobotConfig
 
 Array = NDArray[np.float64]
 
-# Two ticks of an AX-12: a goal at the end of the range may be read back this far inside it.
-RANGE_MARGIN_RAD = 0.0103
+# Six ticks of an AX-12. Friction stops a servo up to four ticks short of a goal at the end of the
+# range; with a smaller margin a joint would stand there, pushed outwards, and nobody would know.
+RANGE_MARGIN_RAD = 0.0307
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

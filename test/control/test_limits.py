@@ -43,6 +43,12 @@ def test_no_velocity_out_of_the_range_but_back_into_it():
     assert found.u[6] == 0.0
 
 
+def test_joint_that_friction_holds_short_of_the_end_is_at_the_end():
+    phi = np.zeros(11)
+    phi[10] = 2.583  # where a mock servo with a goal at 2.6 rad stands
+    assert LIMITS.apply(phi, np.ones(11)).range_limited == (11,)
+
+
 def test_asymmetric_range():
     bounds = [-1.0, 2.0] + [-2.6, 2.6] * 10
     robot = dataclasses.replace(PAPER, joint_limits_rad=tuple(bounds))
