@@ -36,8 +36,9 @@ def motion(series: Series) -> Figure:
     w = q[:, :6]
     shown = snapshot_steps(t, SNAPSHOTS)
     points = [link_points(robot, q[i]) for i in shown]
+    # A reference that is not known in a step is NaN there.
     everything = np.vstack((*points, w[:, :3], w_d[:, :3]))
-    low, high = everything.min(axis=0) - 0.05, everything.max(axis=0) + 0.05
+    low, high = np.nanmin(everything, axis=0) - 0.05, np.nanmax(everything, axis=0) + 0.05
     low[2] = -0.03
 
     width = 10.0

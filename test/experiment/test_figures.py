@@ -78,8 +78,19 @@ def test_motion_shows_as_many_moments_as_there_are():
     assert len(motion(series).get_axes()) == 2
 
 
-def test_series_without_ground_truth_is_drawn(tmp_path):
-    assert len(draw_all(moving(ROBOT, truth=False), 2, tmp_path)) == 6
+def test_series_without_ground_truth_shows_what_was_measured():
+    series = moving(ROBOT, truth=False)
+    _, lower = figures.base_costs(series, None).get_axes()
+    assert lower.get_legend() is None
+    assert len(lower.get_lines()) == 2  # d_min and the floor of it
+    assert len(motion(series).get_axes()) == 14
+
+
+def test_steps_without_a_reference_leave_gaps():
+    series = moving(ROBOT)
+    series.append(step(ROBOT, 61.0, w_d=np.full(6, np.nan), status="stale"))
+    for axes in motion(series).get_axes():
+        assert np.isfinite(axes.get_xlim()).all()
 
 
 def test_steps_that_are_not_finite_are_drawn(tmp_path):
