@@ -19,10 +19,12 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import IO, Any, TypeVar
+from typing import IO, Any, NamedTuple, TypeVar
 
 import rclpy
+from rcl_interfaces.srv import GetParameters, SetParameters
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.publisher import Publisher
 from rclpy.signals import SignalHandlerOptions
 
@@ -32,6 +34,11 @@ ROOT = Path(__file__).resolve().parents[2]
 CONFIG = ROOT / "config"
 
 _Result = TypeVar("_Result")
+
+
+class _Service(NamedTuple):
+    name: str
+    type: Any
 
 
 class Recorder:
@@ -189,12 +196,40 @@ class Graph:
         self.wait_for(future.done, max(1.0, deadline - time.monotonic()), f"a reply of {name}")
         return future.result()
 
+    def set_parameters(self, node_name: str, **values: Any) -> dict[str, Any]:
+        """Set parameters of a node while it runs (``controller__case=1`` for ``controller.case``).
+
+        Returns:
+            ``SetParametersResult`` of each, by the names given here.
+        """
+        request = SetParameters.Request()
+        for name, value in values.items():
+            parameter = Parameter(name.replace("__", "."), value=value)
+            request.parameters.append(parameter.to_parameter_msg())
+        service = _Service("~/set_parameters", SetParameters)
+        return dict(zip(values, self.call(node_name, service, request).results, strict=True))
+
+    def get_parameter(self, node_name: str, name: str) -> Any:
+        """Value of a parameter of a node."""
+        request = GetParameters.Request(names=[name])
+        response = self.call(node_name, _Service("~/get_parameters", GetParameters), request)
+        return parameter_value_to_python(response.values[0])
+
+    def every(self, period_s: float, callback: Callable[[], None]) -> None:
+        """Call ``callback`` periodically, in the thread of the test's node."""
+        self.node.create_timer(period_s, callback)
+        self._executor.wake()
+
+    def now_ns(self) -> int:
+        """Time of the clock that stamps messages [ns]."""
+        return self.node.get_clock().now().nanoseconds
+
     def wait_for(self, condition: Callable[[], _Result], timeout_s: float, what: str) -> _Result:
         """Wait until ``condition()`` is true and return what it returned.
 
         Raises:
-            AssertionError: it was not within ``timeout_s``; names ``what`` and shows the end of
-                every process's output.
+            AssertionError: it was not within ``timeout_s``, or a process failed meanwhile; names
+                ``what`` and shows the end of every process's output.
         """
         deadline = time.monotonic() + timeout_s
         while True:
@@ -205,9 +240,11 @@ class Graph:
             if result:
                 return result
             left = deadline - time.monotonic()
-            if left <= 0:
+            crashed = [process.name for process in self._processes if process.crashed]
+            if left <= 0 or crashed:
+                why = f"{', '.join(crashed)} failed" if crashed else f"not within {timeout_s} s"
                 reports = "\n".join(process.report() for process in self._processes)
-                raise AssertionError(f"{what}: not within {timeout_s} s\n{reports}")
+                raise AssertionError(f"{what}: {why}\n{reports}")
             with self._changed:
                 self._changed.wait(min(0.02, left))
 

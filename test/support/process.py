@@ -27,6 +27,7 @@ class Process:
         environment: Mapping[str, str],
     ) -> None:
         self.name = name
+        self._signalled = False
         self._log = log
         with log.open("wb") as stream:
             self._popen = subprocess.Popen(
@@ -48,6 +49,11 @@ class Process:
     def exit_code(self) -> int | None:
         """Exit code, negative for a signal, ``None`` while it runs."""
         return self._popen.poll()
+
+    @property
+    def crashed(self) -> bool:
+        """Whether it ended with an error, and not by a signal of the test."""
+        return bool(self.exit_code) and not self._signalled
 
     def output(self) -> str:
         """Everything it printed so far."""
@@ -83,5 +89,6 @@ class Process:
         return f"--- {self.name} (pid {self.pid}, {state})\n{tail}"
 
     def _send(self, number: signal.Signals) -> None:
+        self._signalled = True
         if self.running:
             os.kill(self.pid, number)

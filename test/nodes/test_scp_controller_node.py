@@ -1,0 +1,257 @@
+"""The controller node on real DDS: what it commands, and that it commands zero when in doubt."""
+
+import math
+
+import numpy as np
+import pytest
+from snake_interfaces.msg import ControllerState
+from std_srvs.srv import SetBool
+
+from snake_control.control.scp_controller import ScpController
+from snake_control.model.floor import head_pose_on_floor
+from snake_control.nodes import topics
+from snake_control.nodes.conversions import stamp_ns
+from support.controller_rig import GOOD, ControllerRig
+from support.graph import CONFIG, Graph
+
+PAPER_ROBOT = CONFIG / "paper_robot.yaml"
+NODE = "scp_controller"
+STEP_NS = 20_000_000
+
+
+@pytest.fixture(scope="module")
+def shared_rig():
+    with Graph() as graph:
+        rig = ControllerRig(graph)
+        rig.joint_states = rig.head = rig.reference = None
+        graph.start(NODE, params_files=[PAPER_ROBOT])
+        state = rig.wait_status(ControllerState.STATUS_WAITING, what="the node waiting")
+        for topic in (topics.JOINT_STATES, topics.HEAD_ODOMETRY, topics.HEAD_REFERENCE):
+            assert f"waiting for {topic.name}" in state.text
+        yield rig
+
+
+@pytest.fixture
+def rig(shared_rig):
+    shared_rig.repair()
+    shared_rig.wait_status(*GOOD, what="tracking with good inputs")
+    return shared_rig
+
+
+def is_zero(command):
+    return not np.any(command.velocity)
+
+
+def test_commands_what_the_control_law_says(rig):
+    state = rig.wait_status(*GOOD, what="tracking")
+    command = rig.command_of(state)
+    expected = ScpController(rig.config.robot, rig.config.controller).step(
+        np.concatenate([rig.w, rig.phi]), None, rig.table_1, 0.0
+    )
+    assert list(command.name) == list(rig.config.robot.joint_names)
+    np.testing.assert_allclose(command.velocity, expected.u, rtol=1e-6, atol=1e-9)
+    assert not is_zero(command)
+    np.testing.assert_allclose(state.u, expected.u, rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(state.u_unlimited, expected.u_unlimited, rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(state.w, rig.w, atol=1e-12)
+    np.testing.assert_allclose(state.w_d, rig.table_1.w_d, atol=1e-12)
+    np.testing.assert_allclose(state.error, expected.error, atol=1e-12)
+    np.testing.assert_allclose(state.phi, rig.phi, atol=1e-15)
+    np.testing.assert_allclose(state.phi_tilde_dot_d, expected.phi_tilde_dot_d, rtol=1e-6)
+    assert list(state.scp_name) == ["joint_3", "joint_6", "joint_8", "joint_10"]
+    assert state.experiment_case == 3
+    assert state.v_h == pytest.approx(5.8775e-7, rel=1e-4)
+    assert state.v_b1 == pytest.approx(2.4757e8, rel=1e-4)
+    assert state.d_min == pytest.approx(0.034238, abs=1e-6)
+    assert 0 <= state.head_age < 0.1
+
+
+SILENCE = [
+    ("joint_states", topics.JOINT_STATES, 0.1),
+    ("head", topics.HEAD_ODOMETRY, 0.1),
+    ("reference", topics.HEAD_REFERENCE, 0.2),
+]
+
+
+@pytest.mark.parametrize(("attribute", "topic", "timeout"), SILENCE)
+def test_silence_of_an_input_stops_the_joints_in_time(rig, attribute, topic, timeout):
+    setattr(rig, attribute, None)
+    state = rig.wait_status(
+        ControllerState.STATUS_STALE,
+        what=f"{topic.name} stale",
+        texts=[f"{topic.name} is", f"limit {timeout:g} s"],
+    )
+    assert is_zero(rig.command_of(state))
+    # By stamps: no motion is commanded later than the time-out after the last input.
+    limit = rig.last_stamp_ns[topic.name] + timeout * 1e9
+    late = [c for c in rig.commands.messages if stamp_ns(c) > limit]
+    assert late
+    assert all(is_zero(c) for c in late)
+    # And every step still sends a command.
+    before = len(rig.commands.messages)
+    rig.graph.wait_for(lambda: len(rig.commands.messages) > before + 10, 10.0, "ten more commands")
+
+
+def nan_position(rig):
+    rig.joint_states.position[3] = math.nan  # names run backwards: joint_9
+
+
+def missing_joint(rig):
+    rig.joint_states.name[3] = "other"
+
+
+def nan_head(rig):
+    rig.head.pose.pose.position.y = math.nan
+
+
+def no_rotation(rig):
+    rig.head.pose.pose.orientation.w = 7.0
+
+
+def nan_head_twist(rig):
+    rig.head.twist.twist.angular.x = math.inf
+
+
+def wrong_head_frame(rig):
+    rig.head.header.frame_id = "map"
+
+
+def nan_reference(rig):
+    rig.reference.pose.position.z = math.nan
+
+
+def nan_reference_twist(rig):
+    rig.reference.twist.linear.x = math.nan
+
+
+def head_from_the_future(rig):
+    rig.stamp_offset_ns[topics.HEAD_ODOMETRY.name] = 3_000_000_000
+
+
+@pytest.mark.parametrize(
+    ("spoil", "texts"),
+    [
+        (nan_position, ["joint_states", "position of joint_9 is nan"]),
+        (missing_joint, ["joint_states", "joint_9 missing"]),
+        (nan_head, ["head/odometry", "position"]),
+        (no_rotation, ["head/odometry", "quaternion"]),
+        (nan_head_twist, ["head/odometry", "twist"]),
+        (wrong_head_frame, ["head/odometry", "'map'", "'world'"]),
+        (nan_reference, ["head/reference", "position"]),
+        (nan_reference_twist, ["head/reference", "twist"]),
+        (head_from_the_future, ["head/odometry", "ahead of this computer's clock"]),
+    ],
+)
+def test_a_bad_input_stops_the_joints_and_is_named(rig, spoil, texts):
+    spoil(rig)
+    state = rig.wait_status(
+        ControllerState.STATUS_INVALID, what=f"{spoil.__name__} noticed", texts=texts
+    )
+    assert is_zero(rig.command_of(state))
+    rig.repair()
+    rig.wait_status(*GOOD, what="tracking after the repair")
+
+
+def test_enable_service(rig):
+    response = rig.graph.call(NODE, topics.ENABLE, SetBool.Request(data=False))
+    assert response.success
+    state = rig.wait_status(ControllerState.STATUS_DISABLED, what="disabled")
+    assert "~/enable" in state.text
+    assert is_zero(rig.command_of(state))
+    assert rig.graph.call(NODE, topics.ENABLE, SetBool.Request(data=True)).success
+    rig.wait_status(*GOOD, what="tracking again")
+
+
+def test_a_straight_robot_is_singular_and_gets_no_motion(rig):
+    w, phi = rig.w, rig.phi
+    try:
+        rig.phi = np.zeros(len(phi))
+        rig.w = head_pose_on_floor(rig.config.robot, rig.phi, np.zeros(3))
+        rig.repair()
+        state = rig.wait_status(ControllerState.STATUS_FAULT, what="the singular posture")
+    finally:
+        rig.w, rig.phi = w, phi
+        rig.repair()
+    assert "B_tilde" in state.text
+    assert is_zero(rig.command_of(state))
+    rig.wait_status(*GOOD, what="tracking after the fault")
+
+
+def test_yaw_goes_on_across_half_a_turn(rig):
+    for k in range(24):
+        # A full turn and a half in steps of 30 degrees, of robot and reference alike.
+        yaw = math.radians(30 * k)
+        rig.w[5] = yaw
+        rig.repair()
+        state = rig.graph.wait_for(
+            lambda yaw=yaw: (last := rig.states.last)
+            and abs(last.w[5] - yaw) < 1e-9
+            and last,
+            10.0,
+            f"yaw {yaw:.2f}",
+        )
+    assert state.w[5] == pytest.approx(math.radians(690))
+    assert abs(state.error[5]) <= math.pi
+    rig.w[5] = 0.0
+
+
+def test_every_step_without_tracking_was_a_zero(shared_rig):
+    """Over everything that the tests above did."""
+    zero = {stamp_ns(c): is_zero(c) for c in shared_rig.commands.messages}
+    judged = [
+        (state.status in GOOD, zero[stamp_ns(state)])
+        for state in shared_rig.states.messages
+        if stamp_ns(state) in zero
+    ]
+    assert sum(good for good, _ in judged) > 10
+    assert sum(not good for good, _ in judged) > 10
+    assert all(good is not is_zero_ for good, is_zero_ in judged)
+
+
+def test_commands_come_at_the_configured_rate(rig):
+    rig.commands.clear()
+    rig.graph.wait_for(lambda: len(rig.commands.messages) > 100, 30.0, "100 commands")
+    periods = np.diff([stamp_ns(c) for c in rig.commands.messages])
+    assert np.median(periods) == pytest.approx(STEP_NS, rel=0.25)
+
+
+def test_markers_show_robot_and_reference(rig):
+    markers = rig.graph.subscribe(topics.MARKERS)
+    rig.graph.wait_for(lambda: markers.last, 10.0, "markers")
+    found = {marker.ns: marker for marker in markers.last.markers}
+    assert set(found) == {"links", "wheels", "support_polygon", "P_G", "reference"}
+    robot = rig.config.robot
+    assert len(found["links"].points) == robot.links + 1
+    assert len(found["wheels"].points) == 2 * len(robot.wheeled_links)
+    tip = found["links"].points[0]
+    np.testing.assert_allclose([tip.x, tip.y, tip.z], rig.w[:3], atol=1e-9)
+    target = found["reference"].points[1]
+    np.testing.assert_allclose([target.x, target.y, target.z], rig.table_1.w_d[:3], atol=1e-9)
+    assert all(marker.header.frame_id == "world" for marker in found.values())
+
+
+def test_speed_limit_is_named():
+    with Graph() as graph:
+        rig = ControllerRig(graph)
+        graph.start(
+            NODE, params_files=[PAPER_ROBOT], params={"robot.joint_speed_limits_rad_s": [0.05]}
+        )
+        state = rig.wait_status(ControllerState.STATUS_LIMITED, what="the speed limit")
+        command = rig.command_of(state)
+        assert np.abs(command.velocity).max() == pytest.approx(0.05)
+        assert len(state.speed_limited) == 1
+        assert state.speed_limited[0] in state.text
+        assert 0 < state.speed_scale < 1
+        np.testing.assert_allclose(
+            state.u, np.array(state.u_unlimited) * state.speed_scale, rtol=1e-9
+        )
+
+
+def test_the_last_command_of_a_stopped_controller_is_rest():
+    with Graph() as graph:
+        rig = ControllerRig(graph)
+        process = graph.start(NODE, params_files=[PAPER_ROBOT])
+        rig.wait_status(*GOOD, what="tracking")
+        process.interrupt()
+        assert process.wait() == 0
+        graph.wait_for(lambda: is_zero(rig.commands.last), 5.0, "a zero as last command")
