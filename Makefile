@@ -20,7 +20,7 @@ help:
 	  '             CASE=1|2|3 (default 3)  DURATION=seconds (default 60)  SEED=n (default 1)' \
 	  'make test    lint, then all tests' \
 	  'make lint    style, types and the import rules' \
-	  'make bench   measure the time of a control step and of the bus' \
+	  'make bench   time the control step over robot lengths; results in out/bench.json' \
 	  'make clean   remove all that the others made' \
 	  '' \
 	  'Each does the set-up that it needs, once: packages in .venv, messages in install.' \
