@@ -45,6 +45,11 @@ def arm(bus: Bus, joints: Sequence[JointSetup], servos: Sequence[ServoInfo]) -> 
         ServoError: all findings; no torque was switched on, or it is off again.
         BusError: the port failed.
     """
+    with bus.patient():
+        return _arm(bus, joints, servos)
+
+
+def _arm(bus: Bus, joints: Sequence[JointSetup], servos: Sequence[ServoInfo]) -> tuple[Seed, ...]:
     findings: list[str] = []
     seeds: list[Seed] = []
     for joint, servo in zip(joints, servos, strict=True):

@@ -30,6 +30,8 @@ _PING, _READ, _WRITE = 1, 2, 3
 # FF FF id length error | parameters | checksum; length counts error, parameters and checksum.
 _LENGTH_INDEX, _ERROR_INDEX, _PARAMETERS = 3, 4, 5
 
+_PATIENT_TIMEOUT_S, _PATIENT_RETRIES = 0.05, 3
+
 
 class Reply(NamedTuple):
     """A status packet: its parameters and its error bits."""
@@ -73,6 +75,17 @@ class Bus:
     def close(self) -> None:
         """Close the port."""
         self._port.close()
+
+    @contextmanager
+    def patient(self) -> Iterator[None]:
+        """Wait longer and ask more often inside, where no cycle waits: at start, when arming."""
+        timeout, retries = self._port.reply_timeout_s, self._retries
+        self._port.reply_timeout_s = max(timeout, _PATIENT_TIMEOUT_S)
+        self._retries = max(retries, _PATIENT_RETRIES)
+        try:
+            yield
+        finally:
+            self._port.reply_timeout_s, self._retries = timeout, retries
 
     def ping(self, servo_id: int, retries: int | None = None) -> Reply | None:
         """Ask whether a servo is there; ``None`` if nothing answered.

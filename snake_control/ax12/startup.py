@@ -15,7 +15,6 @@ from snake_control.ax12.joint import JOINT_MODE, WHEEL_MODE, JointSetup
 from snake_control.ax12.units import MAX_TICKS, ticks_to_rad
 from snake_control.errors import ServoError
 
-_PATIENCE = 2
 _ALL_REPLIES = 2
 _STATUS_BYTES = 14
 _BITS_PER_BYTE = 10
@@ -66,6 +65,13 @@ def handshake(
         ServoError: lists all findings about all servos.
         BusError: the port failed.
     """
+    with bus.patient():
+        return _handshake(bus, joints, accepted_models)
+
+
+def _handshake(
+    bus: Bus, joints: Sequence[JointSetup], accepted_models: Collection[int]
+) -> Handshake:
     findings: list[str] = []
     warnings: list[str] = []
     servos: list[ServoInfo] = []
@@ -106,18 +112,18 @@ def cycle_duration(servos: Sequence[ServoInfo], baud_rate: int) -> float:
 
 def _read_eeprom(bus: Bus, joint: JointSetup, findings: list[str]) -> bytes | None:
     servo_id = joint.servo_id
-    if bus.ping(servo_id, retries=_PATIENCE) is None:
+    if bus.ping(servo_id) is None:
         corrupt = bus.counters[servo_id].corrupt_replies
         findings.append(
             f"{joint}: does not answer"
-            + (" legibly: do two servos share this id?" if corrupt > _PATIENCE else "")
+            + (" legibly: do two servos share this id?" if corrupt > 1 else "")
         )
         return None
     length = ct.ALARM_SHUTDOWN.end
-    reply = bus.read(servo_id, 0, length, retries=_PATIENCE)
+    reply = bus.read(servo_id, 0, length)
     if reply is not None:
         return reply.data
-    if bus.counters[servo_id].corrupt_replies > _PATIENCE:
+    if bus.counters[servo_id].corrupt_replies > 1:
         why = "its replies are corrupt (two servos with this id, an echo, or a bad cable?)"
     else:
         why = (

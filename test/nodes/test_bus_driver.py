@@ -70,6 +70,18 @@ def test_joint_states_are_complete_and_in_step_with_the_truth(robot: DrivenRobot
     assert robot.bus_state.last.servos[0].voltage == pytest.approx(11.1, abs=0.5)
 
 
+def undisturbed(robot: DrivenRobot, seconds: float) -> tuple[Any, Any]:
+    """The truth before and after some time in which every cycle had a fresh command."""
+    for _ in range(5):
+        robot.bus_state.clear()
+        begin = robot.truth.last
+        robot.let_pass(seconds)
+        end = robot.truth.last
+        if {state.state for state in robot.bus_state.messages} == {BusState.STATE_MOVING}:
+            return begin, end
+    raise AssertionError("this machine is too busy to send commands every 0.1 s")
+
+
 @pytest.mark.parametrize("direction", [1, -1])
 def test_joints_move_at_the_commanded_average_speed(robot: DrivenRobot, direction: int) -> None:
     units = {"joint_6": 0.3, "joint_7": -1.7, "joint_9": 20.0, "joint_2": 0.7}
@@ -77,9 +89,7 @@ def test_joints_move_at_the_commanded_average_speed(robot: DrivenRobot, directio
     robot.command(**velocities)
     robot.wait_for_state(BusState.STATE_MOVING)
     robot.let_pass(0.5)
-    begin = robot.truth.last
-    robot.let_pass(2.0)
-    end = robot.truth.last
+    begin, end = undisturbed(robot, 2.0)
     elapsed = stamp(end) - stamp(begin)
     for name, velocity in velocities.items():
         average = (joint(end, name) - joint(begin, name)) / elapsed
@@ -157,21 +167,27 @@ def test_names_count_not_their_order(robot: DrivenRobot) -> None:
     robot.graph.wait_for(moved, 10.0, "joint_8 to move")
 
 
-def test_torque_off_and_on_does_not_jump(robot: DrivenRobot) -> None:
-    assert robot.call(topics.SET_TORQUE, data=False).success
-    state = robot.wait_for_state(BusState.STATE_TORQUE_OFF)
-    assert not any(servo.torque_enabled for servo in state.servos)
-    robot.command(joint_7=0.5)
-    robot.let_pass(0.5)
-    assert robot.bus_state.last.state == BusState.STATE_TORQUE_OFF
-    robot.fall_silent()
-    begin = robot.truth.last
-    answer = robot.call(topics.SET_TORQUE, data=True)
-    assert answer.success, answer.message
-    robot.wait_for_state(BusState.STATE_HOLDING)
-    robot.let_pass(0.5)
-    for name in NAMES:
-        assert abs(joint(robot.truth.last, name) - joint(begin, name)) <= 34 * TICK, name
+def test_torque_off_and_on_does_not_jump(tmp_path: Path) -> None:
+    with DrivenRobot(tmp_path) as robot:
+        robot.wait_for_state(BusState.STATE_HOLDING)
+        assert robot.call(topics.SET_TORQUE, data=False).success
+        state = robot.wait_for_state(BusState.STATE_TORQUE_OFF)
+        assert not any(servo.torque_enabled for servo in state.servos)
+        robot.command(joint_7=0.5)
+        robot.let_pass(0.5)
+        assert robot.bus_state.last.state == BusState.STATE_TORQUE_OFF
+        robot.fall_silent()
+        # The head sinks; that is no jump.
+        robot.graph.wait_for(
+            lambda: max(map(abs, robot.truth.last.phi_dot)) < 0.01, 20.0, "all joints at rest"
+        )
+        begin = robot.truth.last
+        answer = robot.call(topics.SET_TORQUE, data=True)
+        assert answer.success, answer.message
+        robot.wait_for_state(BusState.STATE_HOLDING)
+        robot.let_pass(1.0)
+        for name in NAMES:
+            assert abs(joint(robot.truth.last, name) - joint(begin, name)) <= 4 * TICK, name
 
 
 def test_an_emergency_stop_latches_until_reset(robot: DrivenRobot) -> None:
@@ -192,7 +208,8 @@ def test_an_emergency_stop_latches_until_reset(robot: DrivenRobot) -> None:
 
 
 def test_diagnostics_have_one_status_of_the_bus_and_one_of_each_servo(robot: DrivenRobot) -> None:
-    robot.graph.wait_for(lambda: robot.diagnostics.last, 5.0, "/diagnostics")
+    robot.diagnostics.clear()
+    robot.graph.wait_for(lambda: len(robot.diagnostics.messages) > 1, 10.0, "/diagnostics")
     statuses = robot.diagnostics.last.status
     assert [s.name for s in statuses] == ["bus_driver: bus", *(f"bus_driver: {n}" for n in NAMES)]
     assert all(s.level == DiagnosticStatus.OK for s in statuses), statuses

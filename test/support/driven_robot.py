@@ -104,7 +104,7 @@ class DrivenRobot:
 
     def let_pass(self, seconds: float) -> None:
         """Wait until the mock's robot is this much older."""
-        begin = self.truth.last
+        begin = self.graph.wait_for(lambda: self.truth.last, 30.0, "the mock's ground truth")
 
         def passed() -> bool:
             return stamp(self.truth.last) - stamp(begin) >= seconds
