@@ -131,19 +131,19 @@ class Servo:
         p, motion, drive = self.parameters, self.motion, self._drive
         mechanics.advance(motion, drive, p.motor, load_nm, self.supply_voltage_v, dt)
         self._sensor.step(motion.angle_rad, dt)
-        self.health.step(p.health, motion.output, self._overloaded(drive, load_nm), dt)
+        self.health.step(p.health, motion.output, self._overloaded(load_nm), dt)
         self._watch()
         if self._executing:
             self._follow_execution(drive, dt)
 
-    def _overloaded(self, drive: mechanics.Drive, load_nm: float) -> bool:
-        """Whether the load is more than the output and the gear's friction carry together."""
-        if not self._driven:
+    def _overloaded(self, load_nm: float) -> bool:
+        """Whether the load is more than torque limit and gear friction carry together."""
+        limit = self._torque_limit
+        if not self._driven or limit == 0:
             return False
-        limit = drive.torque_limit if isinstance(drive, mechanics.ToGoal) else abs(drive.output)
         motor = self.parameters.motor
         carried = limit * motor.torque(self.supply_voltage_v) + motor.friction_torque_nm
-        return limit > 0 and abs(load_nm) > carried
+        return abs(load_nm) > carried
 
     def _watch(self) -> None:
         self._conditions = self.health.conditions(
@@ -181,6 +181,7 @@ class Servo:
         self.wheel_mode = r["cw_angle_limit"] == 0 == r["ccw_angle_limit"]
         self._voltage_limits_v = r["min_voltage_limit"] / 10, r["max_voltage_limit"] / 10
         self._temperature_limit_c = float(r["temperature_limit"])
+        self._torque_limit = r["torque_limit"] / units.OUTPUT_STEPS
         self._drive = self._read_drive()
 
     def _read_drive(self) -> mechanics.Drive:
@@ -188,7 +189,7 @@ class Servo:
         r = self.registers
         if not self._driven:
             return mechanics.OpenLoop()
-        limit = r["torque_limit"] / units.OUTPUT_STEPS
+        limit = self._torque_limit
         speed = r["moving_speed"]
         if self.wheel_mode:
             output = min((speed & 0x3FF) / units.OUTPUT_STEPS, limit)

@@ -81,6 +81,22 @@ def test_without_the_shutdown_bit_an_overload_only_shows_while_it_lasts():
     assert servo.error == OK
 
 
+def test_a_wheel_at_low_output_is_not_overloaded_by_a_load_within_its_limit():
+    servo = Servo(1, eeprom={"cw_angle_limit": 0, "ccw_angle_limit": 0})
+    servo.store("moving_speed", 100)
+    run(servo, 3.0, load_nm=0.6)
+
+    assert servo.error == OK
+
+
+def test_a_torque_limit_below_the_load_is_an_overload():
+    servo = holding()
+    servo.store("torque_limit", 200)
+    run(servo, 2.1, load_nm=0.6)
+
+    assert servo.error == ErrorBit.OVERLOAD
+
+
 def test_without_torque_nothing_is_overloaded():
     servo = Servo(1)
     run(servo, 3.0, load_nm=2.0)
