@@ -10,6 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 from rclpy.node import Node
+from rclpy.qos import QoSProfile
 from snake_interfaces.msg import BusState, ControllerState, PlantState, PoseStatus
 
 from snake_control.experiment.series import Series, Step, pose_error
@@ -31,6 +32,7 @@ FOLLOWING = (ControllerState.STATUS_TRACKING, ControllerState.STATUS_LIMITED)
 
 _GROUND_TRUTH_WAIT_NS = 500_000_000
 _GROUND_TRUTH_KEPT = 100
+_QUEUE = 200
 
 
 class Recorder:
@@ -41,6 +43,7 @@ class Recorder:
     the node it was given; not thread-safe.
 
     Attributes:
+        received: how many messages have arrived.
         bus: latest bus state, ``None`` before the first.
         head: latest status of the head pose, ``None`` before the first.
         controller: latest controller state, ``None`` before the first.
@@ -49,6 +52,7 @@ class Recorder:
 
     def __init__(self, node: Node, series: Series) -> None:
         """Subscribe; rows are appended to ``series`` once ``start`` was called."""
+        self.received = 0
         self.bus: BusState | None = None
         self.head: PoseStatus | None = None
         self.controller: ControllerState | None = None
@@ -68,7 +72,7 @@ class Recorder:
             (CONTROLLER_STATE, self._take_controller),
             (PLANT_STATE, self._take_truth),
         ):
-            node.create_subscription(topic.type, topic.name, callback, topic.qos)
+            node.create_subscription(topic.type, topic.name, callback, _patient(topic.qos))
 
     def start(self) -> None:
         """Record from the next control step that follows a reference."""
@@ -99,6 +103,7 @@ class Recorder:
         )
 
     def _take_bus(self, message: BusState) -> None:
+        self.received += 1
         self.bus = message
         if not self._recording:
             return
@@ -109,9 +114,11 @@ class Recorder:
         self._lost |= {_joint(servo.joint) for servo in message.servos if not servo.online}
 
     def _take_head(self, message: PoseStatus) -> None:
+        self.received += 1
         self.head = message
 
     def _take_controller(self, message: ControllerState) -> None:
+        self.received += 1
         self.controller = message
         if not self._recording:
             return
@@ -124,6 +131,7 @@ class Recorder:
         self._join()
 
     def _take_truth(self, message: PlantState) -> None:
+        self.received += 1
         self._truth.append((_nanoseconds(message), message))
         self._join()
 
@@ -191,6 +199,16 @@ def _step(
         step_time_s=controller.step_time,
         bus_cycle_time_s=math.nan if bus is None else bus.cycle_time,
         bus_rate_hz=math.nan if bus is None else bus.cycle_rate,
+    )
+
+
+def _patient(qos: QoSProfile) -> QoSProfile:
+    """Return a profile with a queue that outlasts a stall of this process."""
+    return QoSProfile(
+        history=qos.history,
+        depth=_QUEUE,
+        reliability=qos.reliability,
+        durability=qos.durability,
     )
 
 

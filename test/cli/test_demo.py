@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from snake_control.cli.demo import Outcome, outcome_at
 from snake_control.config import RobotConfig
 from snake_control.experiment.series import Series
 from support.process import Process
@@ -129,6 +130,35 @@ def test_demo_follows_the_reference_and_leaves_all_results(start):
     assert " / 5 s" in printed  # progress
 
 
+@pytest.mark.parametrize(
+    ("t_s", "fell_at_s", "case", "expected"),
+    [
+        (9.9, None, 3, None),
+        (10.0, None, 3, Outcome("duration reached", 0)),
+        (6.9, 5.0, 3, None),
+        (7.0, 5.0, 3, Outcome("the robot fell at 5.0 s", 1)),
+        (7.0, 5.0, 2, Outcome("the robot fell at 5.0 s", 1)),
+        (7.0, 5.0, 1, Outcome("the robot fell at 5.0 s", 0)),
+        (10.0, 9.5, 3, Outcome("the robot fell at 9.5 s", 1)),
+    ],
+)
+def test_a_fall_fails_in_all_cases_but_the_first(t_s, fell_at_s, case, expected):
+    assert outcome_at(t_s, fell_at_s, duration_s=10.0, case=case) == expected
+
+
+def test_fall_is_reported_and_is_no_success(start, tmp_path):
+    # With a light base the centre of mass lies before the foremost wheels.
+    light = tmp_path / "light.yaml"
+    masses = [0.1] * 5 + [0.01] * 7
+    light.write_text(f"/**:\n  ros__parameters:\n    robot:\n      link_mass_kg: {masses}\n")
+    demo = start("--duration", "60", "--params-file", str(light))
+    assert demo.process.wait(60.0) == 1, demo.process.report()
+    assert demo.summary["fell"] is True
+    assert demo.summary["ended"] == f"the robot fell at {demo.summary['fell_at_s']:.1f} s"
+    assert demo.summary["duration_s"] < 10.0
+    assert demo.summary["ended"] in demo.process.output()
+
+
 def test_ctrl_c_stops_the_nodes_in_order_and_writes_results(start):
     demo = start("--duration", "60", "--case", "1")
     demo.wait_for_rows(60)
@@ -170,13 +200,13 @@ def test_nodes_do_not_outlive_a_demo_that_is_killed(start):
 
 
 def test_driver_that_finds_no_servo_is_reported_with_its_log(start, tmp_path):
-    # A driver that looks for servos the mock does not have.
+    # The nodes read one file, so the mock's servos are put on another baud rate instead.
     wrong = tmp_path / "wrong.yaml"
-    ids = ", ".join(str(i) for i in range(101, 112))
-    wrong.write_text(f"/**/bus_driver:\n  ros__parameters:\n    servos:\n      ids: [{ids}]\n")
+    wrong.write_text("/**/mock_bus:\n  ros__parameters:\n    baud_rate: 57600\n")
     demo = start("--params-file", str(wrong))
-    code = demo.process.wait(60.0)
-    assert code in (1, 2), demo.process.report()
+    assert demo.process.wait(60.0) == 1, demo.process.report()
+    assert demo.summary["ended"].startswith("node bus_driver ended with exit code 1")
+    assert "joint_11 (servo id 11): does not answer" in demo.process.output()
 
 
 def test_wrong_configuration_is_refused_before_anything_starts(start, tmp_path):
