@@ -18,6 +18,8 @@ from lifecycle_msgs.msg import State, Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from snake_interfaces.msg import BusState
 
+from snake_control.ax12.bus import Bus
+from snake_control.ax12.port import SerialPort
 from snake_control.nodes import topics
 from support.driven_robot import NAMES, DrivenRobot, stamp
 
@@ -291,6 +293,36 @@ def test_no_port_gives_one_message_and_an_exit_code(tmp_path: Path) -> None:
         assert robot.driver.wait(30.0) == 1
         assert "no such port" in robot.driver.output()
         assert "Traceback" not in robot.driver.output()
+
+
+def turn_joint_11_into_a_wheel(port: Path) -> None:
+    bus = Bus(SerialPort(str(port), 1000000, reply_timeout_s=0.1), retries=3)
+    bus.write_verified(11, 6, bytes(4))
+    bus.close()
+
+
+def test_one_joint_in_wheel_mode(tmp_path: Path) -> None:
+    modes = {"servos": {"velocity_modes": ["joint"] * 10 + ["wheel"]}}
+    with DrivenRobot(
+        tmp_path, driver=modes, before_driver=turn_joint_11_into_a_wheel
+    ) as robot:
+        robot.wait_for_state(BusState.STATE_HOLDING)
+        robot.command(joint_11=1.5, joint_7=0.2)
+        robot.wait_for_state(BusState.STATE_MOVING)
+        robot.let_pass(0.5)
+        begin, end = undisturbed(robot, 0.7)
+        elapsed = stamp(end) - stamp(begin)
+        # Output, not speed: friction takes its share.
+        assert joint(end, "joint_11") - joint(begin, "joint_11") > 0.5 * elapsed
+        assert (joint(end, "joint_7") - joint(begin, "joint_7")) / elapsed == pytest.approx(
+            0.2, abs=0.02
+        )
+        robot.fall_silent()
+        robot.wait_for_state(BusState.STATE_HOLDING)
+        robot.let_pass(0.3)
+        begin = robot.truth.last
+        robot.let_pass(0.5)
+        assert abs(joint(robot.truth.last, "joint_11") - joint(begin, "joint_11")) <= 2 * TICK
 
 
 def test_the_lifecycle_without_autostart(tmp_path: Path) -> None:

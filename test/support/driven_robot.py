@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import threading
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
-
-import yaml
 
 from snake_control.nodes import topics
 from support.graph import CONFIG, Graph
@@ -31,6 +30,7 @@ class DrivenRobot:
         driver: Mapping[str, Any] | None = None,
         mock: Mapping[str, Any] | None = None,
         with_mock: bool = True,
+        before_driver: Callable[[Path], None] | None = None,
     ) -> None:
         """Prepare.
 
@@ -38,12 +38,13 @@ class DrivenRobot:
             directory: for the port's link and the parameter file.
             driver, mock: parameters of the two nodes.
             with_mock: whether there is a mock from the start.
+            before_driver: called with the mock's port before the driver starts.
         """
         port = str(directory / "port")
         self.port = Path(port)
         self._file = directory / "test.yaml"
         self._file.write_text(
-            yaml.safe_dump(
+            json.dumps(  # JSON is YAML; PyYAML would write aliases, which rcl refuses
                 {
                     "/**/mock_bus": {"ros__parameters": {"port": port, **(mock or {})}},
                     "/**/bus_driver": {"ros__parameters": {"port": port, **(driver or {})}},
@@ -51,6 +52,7 @@ class DrivenRobot:
             )
         )
         self._with_mock = with_mock
+        self._before_driver = before_driver
         self._velocities: tuple[float, ...] | None = None
         self._lock = threading.Lock()
 
@@ -65,6 +67,8 @@ class DrivenRobot:
             self.graph.node.create_timer(0.02, self._publish)
             if self._with_mock:
                 self.start_mock()
+            if self._before_driver is not None:
+                self._before_driver(self.port)
             self.driver = self.start_driver()
         except BaseException:
             self.graph.__exit__(None, None, None)

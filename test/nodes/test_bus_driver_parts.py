@@ -1,0 +1,53 @@
+"""The parts of the driver node that need no graph: its deadlines and the check of commands."""
+
+from __future__ import annotations
+
+import pytest
+
+pytest.importorskip("rclpy")
+pytest.importorskip("snake_interfaces")
+
+from rclpy.clock import ClockType
+from rclpy.time import Time
+from snake_interfaces.msg import JointVelocityCommand
+
+from snake_control.nodes.bus_messages import checked_velocities
+from snake_control.nodes.bus_schedule import Schedule
+
+PERIOD = 0.02
+
+
+def test_cycles_keep_to_absolute_deadlines() -> None:
+    schedule = Schedule(PERIOD)
+    now = 100.0
+    schedule.start(now)
+    begins = []
+    for i in range(100):
+        schedule.begin(now)
+        begins.append(now)
+        now += 0.003 + 0.0001 * (i % 7)  # the cycle's own work
+        now += schedule.end(now) + 0.0005 * (i % 3)  # sleeps oversleep
+    assert begins[-1] == pytest.approx(100.0 + 99 * PERIOD, abs=0.002)
+    assert (schedule.cycles, schedule.late_cycles) == (100, 0)
+    assert schedule.rate == pytest.approx(50.0, rel=0.05)
+
+
+def test_a_long_pause_is_counted_once_and_not_caught_up() -> None:
+    schedule = Schedule(PERIOD)
+    schedule.start(0.0)
+    schedule.begin(0.0)
+    assert schedule.end(0.095) == 0.0  # four periods were missed
+    schedule.begin(0.095)
+    assert schedule.late_cycles == 1
+    assert schedule.end(0.098) == pytest.approx(0.002)
+    schedule.begin(0.1)
+    assert schedule.late_cycles == 1
+
+
+def test_velocities_come_in_joint_order_with_their_age() -> None:
+    message = JointVelocityCommand(name=["b", "a"], velocity=[2.0, 1.0])
+    message.header.stamp.sec = 10
+    now = Time(seconds=10, nanoseconds=50_000_000, clock_type=ClockType.ROS_TIME)
+    velocities, age = checked_velocities(message, ["a", "b"], now, 0.1)
+    assert velocities == (1.0, 2.0)
+    assert age == pytest.approx(0.05)
