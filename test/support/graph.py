@@ -146,15 +146,18 @@ class Graph:
         Args:
             kind: ``bus_driver``, ``scp_controller``, ...
             params_files: given as ``--params-file``, in this order.
-            params: single parameters, given as ``-p name:=value`` after the files.
+            params: single parameters, which win over the files. (As ``-p name:=value`` they would
+                not: rcl lets a file's section for one node win over them.)
             arguments: further ROS arguments, such as ``["-r", "__node:=other"]``.
         """
         ros = ["--ros-args"]
         for path in params_files:
             ros += ["--params-file", str(path)]
-        for name, value in (params or {}).items():
+        if params:
             # JSON is YAML as rcl reads it.
-            ros += ["-p", f"{name}:={json.dumps(value)}"]
+            path = Path(self._directory.name) / f"{len(self._processes)}_{kind}.yaml"
+            path.write_text(json.dumps({f"/**/{kind}": {"ros__parameters": dict(params)}}))
+            ros += ["--params-file", str(path)]
         ros += arguments
         return self.run(f"snake_control.nodes.{kind}", ros, name=kind)
 
@@ -215,6 +218,10 @@ class Graph:
         response = self.call(node_name, _Service("~/get_parameters", GetParameters), request)
         return parameter_value_to_python(response.values[0])
 
+    def report(self) -> str:
+        """State and end of the output of every process."""
+        return "\n".join(process.report() for process in self._processes)
+
     def every(self, period_s: float, callback: Callable[[], None]) -> None:
         """Call ``callback`` periodically, in the thread of the test's node."""
         self.node.create_timer(period_s, callback)
@@ -243,8 +250,7 @@ class Graph:
             crashed = [process.name for process in self._processes if process.crashed]
             if left <= 0 or crashed:
                 why = f"{', '.join(crashed)} failed" if crashed else f"not within {timeout_s} s"
-                reports = "\n".join(process.report() for process in self._processes)
-                raise AssertionError(f"{what}: {why}\n{reports}")
+                raise AssertionError(f"{what}: {why}\n{self.report()}")
             with self._changed:
                 self._changed.wait(min(0.02, left))
 

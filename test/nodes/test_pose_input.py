@@ -1,0 +1,181 @@
+"""The pose input node on real DDS: odometry of good poses, a status of bad ones."""
+
+import math
+
+import numpy as np
+import pytest
+from geometry_msgs.msg import PoseStamped
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from snake_interfaces.msg import PoseStatus
+
+from snake_control.model.rotation import quaternion_from_rpy
+from snake_control.nodes import topics
+from snake_control.nodes.conversions import array, head_motion, header, point, quaternion, stamp_ns
+from support.graph import CONFIG, Graph
+
+MS = 1_000_000
+RPY = np.array([0.1, -0.8, 2.5])
+
+
+class Mocap:
+    """A motion capture system whose poses a test makes."""
+
+    def __init__(self, graph, reliability=ReliabilityPolicy.BEST_EFFORT):
+        self.graph = graph
+        self.odometry = graph.subscribe(topics.HEAD_ODOMETRY)
+        self.status = graph.subscribe(topics.HEAD_STATUS)
+        qos = QoSProfile(depth=5, reliability=reliability)
+        self.publisher = graph.node.create_publisher(PoseStamped, topics.MOCAP_POSE.name, qos)
+        graph.start("pose_input", params_files=[CONFIG / "paper_robot.yaml"])
+        graph.wait_for(self.publisher.get_subscription_count, 30.0, "pose_input")
+
+    def send(self, stamp, position=(0.0, 0.0, 0.3), rotation=None, frame="world"):
+        message = PoseStamped(header=header(stamp, frame))
+        message.pose.position = point(position)
+        message.pose.orientation = quaternion(
+            quaternion_from_rpy(RPY) if rotation is None else rotation
+        )
+        self.publisher.publish(message)
+        return stamp
+
+    def wait_status(self, status, text=""):
+        def found():
+            last = self.status.last
+            return last if last and last.status == status and text in last.text else None
+
+        return self.graph.wait_for(found, 20.0, f"status {status} '{text}'")
+
+    def send_until_valid(self):
+        """Send until a pose has come through (best effort may lose the first ones)."""
+        before = len(self.odometry.messages)
+
+        def arrived():
+            self.send(self.graph.now_ns())
+            return len(self.odometry.messages) > before
+
+        self.graph.wait_for(arrived, 20.0, "odometry")
+        return self.wait_status(PoseStatus.STATUS_VALID)
+
+
+@pytest.fixture(scope="module")
+def mocap():
+    with Graph() as graph:
+        mocap = Mocap(graph)
+        mocap.wait_status(PoseStatus.STATUS_WAITING, "mocap/pose")
+        assert math.isinf(mocap.status.last.age)
+        assert mocap.odometry.last is None
+        yield mocap
+
+
+def test_good_poses_become_odometry(mocap):
+    mocap.send_until_valid()
+    last = mocap.odometry.last
+    assert last.header.frame_id == "world"
+    assert last.child_frame_id == "link_1"
+    # The moment of capture, not of arrival.
+    stamps = [stamp_ns(message) for message in mocap.odometry.messages]
+    assert stamps == sorted(stamps)
+    w, w_dot = head_motion(last, "world")
+    np.testing.assert_allclose(w, [0, 0, 0.3, *RPY], atol=1e-9)
+    np.testing.assert_allclose(w_dot, np.zeros(6), atol=1e-9)
+
+
+def test_velocity_is_in_the_frame_of_the_head(mocap):
+    # Long enough ago that nothing of an earlier test is in the filter; 1 s at 10 ms.
+    mocap.send_until_valid()
+    start = stamp_ns(mocap.odometry.last)
+
+    def sent():
+        now = mocap.graph.now_ns()
+        mocap.send(now, (0.05 * (now - start) * 1e-9, 0.0, 0.3))
+        return now - start > 3e9
+
+    mocap.graph.wait_for(sent, 30.0, "three seconds of motion")
+    mocap.graph.wait_for(
+        lambda: stamp_ns(mocap.odometry.last) - start > 2.8e9, 10.0, "the odometry of it"
+    )
+    twist = mocap.odometry.last.twist.twist
+    _, w_dot = head_motion(mocap.odometry.last, "world")
+    np.testing.assert_allclose(w_dot[:3], [0.05, 0, 0], atol=2e-3)
+    # Yawed by 2.5 rad, the head moves backwards in its own frame.
+    assert twist.linear.x == pytest.approx(0.05 * math.cos(2.5) * math.cos(-0.8), abs=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("pose", "text"),
+    [
+        ({"position": (math.nan, 0, 0)}, "not finite"),
+        ({"rotation": (0, 0, math.nan, 1)}, "not finite"),
+        ({"rotation": (0, 0, 0, 0)}, "quaternion has length 0"),
+        ({"rotation": (0, 0, 0, 2)}, "quaternion has length 2"),
+    ],
+)
+def test_a_bad_pose_gives_a_status_and_no_odometry(mocap, pose, text):
+    before = mocap.send_until_valid()
+    bad_stamps = set()
+
+    def noticed():
+        bad_stamps.add(mocap.send(mocap.graph.now_ns(), **pose))
+        last = mocap.status.last
+        return last.status == PoseStatus.STATUS_INVALID and text in last.text and last
+
+    status = mocap.graph.wait_for(noticed, 20.0, f"the status '{text}'")
+    assert status.rejected > before.rejected
+    mocap.send_until_valid()
+    assert bad_stamps.isdisjoint(stamp_ns(message) for message in mocap.odometry.messages)
+
+
+def test_a_pose_from_the_future_is_refused(mocap):
+    mocap.send_until_valid()
+
+    def noticed():
+        mocap.send(mocap.graph.now_ns() + 5000 * MS)
+        return "ahead of this computer's clock" in mocap.status.last.text
+
+    mocap.graph.wait_for(noticed, 20.0, "the clocks found apart")
+    assert mocap.status.last.status == PoseStatus.STATUS_INVALID
+    mocap.send_until_valid()
+
+
+def test_silence_makes_the_pose_stale(mocap):
+    mocap.send_until_valid()
+    status = mocap.wait_status(PoseStatus.STATUS_STALE, "limit 0.1 s")
+    assert status.age > 0.1
+
+
+def test_old_poses_are_stale_although_they_arrive(mocap):
+    # A gap restarts the filter, so these are in order.
+    mocap.wait_status(PoseStatus.STATUS_STALE)
+
+    def noticed():
+        mocap.send(mocap.graph.now_ns() - 70 * MS)
+        mocap.send(mocap.graph.now_ns() - 500 * MS)
+        return mocap.status.last.out_of_order > 3
+
+    mocap.graph.wait_for(noticed, 20.0, "poses found out of order")
+    stamps = [stamp_ns(message) for message in mocap.odometry.messages]
+    assert stamps == sorted(stamps)
+    assert "synchronised" in mocap.wait_status(PoseStatus.STATUS_STALE).text
+
+
+def test_status_comes_regularly_and_counts(mocap):
+    mocap.status.clear()
+    mocap.graph.wait_for(lambda: len(mocap.status.messages) >= 5, 10.0, "five statuses")
+    counts = [s.accepted for s in mocap.status.messages]
+    assert counts == sorted(counts)
+    assert counts[0] > 0
+
+
+def test_reliable_poses_of_another_frame_are_taken_with_a_warning():
+    with Graph() as graph:
+        mocap = Mocap(graph, ReliabilityPolicy.RELIABLE)
+
+        def arrived():
+            mocap.send(graph.now_ns(), frame="mocap_volume")
+            return mocap.odometry.last
+
+        graph.wait_for(arrived, 20.0, "odometry")
+        assert mocap.odometry.last.header.frame_id == "world"
+        np.testing.assert_allclose(array(mocap.odometry.last.pose.pose.position), [0, 0, 0.3])
+        report = graph.report()
+        assert "mocap_volume" in report
