@@ -18,7 +18,7 @@ LOCK_WRITABLE = range(0x18, 0x24)
 """The only addresses that can be written while Lock is 1 (manual, example 20)."""
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, eq=False)
 class Register:
     """One item of the control table.
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import select
 import threading
 from collections import deque
 from collections.abc import Callable
+from pathlib import Path
 
 from snake_control.errors import BusError, SnakeError
 from snake_control.mock.bus import Bus, Reply
@@ -68,6 +70,7 @@ class Server:
             raise BusError(f"the mock bus stopped: {self._failure}") from self._failure
 
     def _run(self) -> None:
+        _wake_punctually()
         try:
             while not self._stop.is_set():
                 self._serve()
@@ -91,3 +94,9 @@ class Server:
         if self._replies:
             until = min(until, self._replies[0].at)
         return max(0.0, until - self._clock())
+
+
+def _wake_punctually() -> None:
+    """Have Linux wake this thread when it asked for, not up to 50 us later as is usual."""
+    with contextlib.suppress(OSError):
+        Path(f"/proc/{threading.get_native_id()}/timerslack_ns").write_text("1")
