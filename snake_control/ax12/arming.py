@@ -13,7 +13,7 @@ from snake_control.ax12 import control_table as ct
 from snake_control.ax12.bus import Bus
 from snake_control.ax12.joint import WHEEL_MODE, JointSetup
 from snake_control.ax12.startup import ServoInfo
-from snake_control.ax12.units import MAX_TICKS, ticks_to_rad
+from snake_control.ax12.units import MAX_TICKS, decode_signed, ticks_to_rad
 from snake_control.ax12.velocity import SEED_SPEED_RAW
 from snake_control.errors import ServoError
 
@@ -126,7 +126,8 @@ def _goal_to_hold(joint: JointSetup, servo: ServoInfo, ram: bytes) -> int:
     if position > MAX_TICKS:
         raise ServoError([f"reports position {position}, which does not exist"])
     goal = ct.GOAL_POSITION.decode(ram, _RAM)
-    held = ct.TORQUE_ENABLE.decode(ram, _RAM) and not ct.PRESENT_SPEED.decode(ram, _RAM)
+    at_rest = decode_signed(ct.PRESENT_SPEED.decode(ram, _RAM)) == 0
+    held = ct.TORQUE_ENABLE.decode(ram, _RAM) and at_rest
     if held and abs(goal - position) <= joint.compliance_ticks:
         # It holds already, a droop away from its goal; goal = position would let it sag once more.
         position = goal

@@ -182,6 +182,7 @@ def test_torque_comes_last_and_goals_are_where_the_joints_are(
 
 def test_a_servo_that_holds_already_keeps_its_goal(bus: Bus, servos: ScriptedServos) -> None:
     """A restarted driver must not let a loaded joint sag by its droop once more."""
+    servos.memory[1][39] = 4  # clockwise, at speed 0
     for servo_id in (1, 2):
         servos.memory[servo_id][24] = 1
         servos.memory[servo_id][30:32] = (520).to_bytes(2, "little")

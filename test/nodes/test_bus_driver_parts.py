@@ -11,6 +11,8 @@ from rclpy.clock import ClockType
 from rclpy.time import Time
 from snake_interfaces.msg import JointVelocityCommand
 
+from snake_control.config import BusDriverConfig
+from snake_control.errors import ConfigError
 from snake_control.nodes.bus_messages import checked_velocities
 from snake_control.nodes.bus_schedule import Schedule
 
@@ -42,6 +44,12 @@ def test_a_long_pause_is_counted_once_and_not_caught_up() -> None:
     assert schedule.end(0.098) == pytest.approx(0.002)
     schedule.begin(0.1)
     assert schedule.late_cycles == 1
+
+
+def test_a_look_ahead_shorter_than_two_cycles_is_refused() -> None:
+    BusDriverConfig(rate_hz=20.0, look_ahead_s=0.1)
+    with pytest.raises(ConfigError, match=r"look_ahead_s = 0.1: at least two bus cycles, 0.2 s"):
+        BusDriverConfig(rate_hz=10.0, look_ahead_s=0.1)
 
 
 def test_velocities_come_in_joint_order_with_their_age() -> None:
