@@ -19,13 +19,14 @@ from std_srvs.srv import SetBool, Trigger
 from snake_control.ax12.health import HealthLog, Level, Thresholds, Verdict, judge
 from snake_control.errors import SnakeError
 from snake_control.nodes import topics
-from snake_control.nodes.bus_loop import BusLoop, Snapshot
+from snake_control.nodes.bus_loop import BusLoop
 from snake_control.nodes.bus_messages import (
     InvalidCommandError,
     StateMessages,
     checked_velocities,
     diagnostics,
 )
+from snake_control.nodes.bus_snapshot import Snapshot
 from snake_control.nodes.parameters import NodeParameters
 from snake_control.nodes.process import run
 

@@ -7,7 +7,6 @@ thread carries out between two cycles.
 from __future__ import annotations
 
 import dataclasses
-import enum
 import math
 import queue
 import threading
@@ -16,13 +15,14 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 
 from snake_control.ax12.bus import Bus
-from snake_control.ax12.chain import JointReading, Motion, ServoChain
+from snake_control.ax12.chain import Motion, ServoChain
 from snake_control.ax12.joint import joint_setups
 from snake_control.ax12.port import SerialPort
 from snake_control.ax12.startup import cycle_duration, handshake
 from snake_control.config import Config
 from snake_control.errors import BusError, ServoError, SnakeError
 from snake_control.nodes.bus_schedule import Schedule
+from snake_control.nodes.bus_snapshot import Snapshot, State
 
 _READ_SHARE = 0.85
 """Part of the period after which reads are left to the next cycle."""
@@ -31,44 +31,6 @@ _REQUEST_TIMEOUT_S = 10.0
 
 _HOLD_BURST = 5
 """Cycles of hold before the driver lets go: SYNC_WRITE is not acknowledged."""
-
-
-class State(enum.IntEnum):
-    """What the driver does with commands; the numbers of snake_interfaces/BusState."""
-
-    INACTIVE = 0
-    HOLDING = 1
-    MOVING = 2
-    TORQUE_OFF = 3
-    STOPPED = 4
-    EMERGENCY_STOP = 5
-
-
-@dataclasses.dataclass(frozen=True)
-class Snapshot:
-    """The bus after one cycle.
-
-    Attributes:
-        state, text: what is done with commands, and why.
-        read_at: middle of the read cycle on the monotonic clock [s].
-        readings: one per joint.
-        armed: whether torque is on.
-        cycle_time: from the first byte to the last [s].
-        cycle_rate: measured [Hz].
-        command_age: [s], infinite without a command.
-        cycles, late_cycles: since activation.
-    """
-
-    state: State
-    text: str
-    read_at: float
-    readings: tuple[JointReading, ...]
-    armed: bool
-    cycle_time: float
-    cycle_rate: float
-    command_age: float
-    cycles: int
-    late_cycles: int
 
 
 @dataclasses.dataclass(frozen=True)

@@ -14,7 +14,7 @@ from snake_interfaces.msg import BusState, JointVelocityCommand, ServoState
 from snake_control.ax12.chain import JointReading
 from snake_control.ax12.health import Level, Verdict
 from snake_control.ax12.units import error_names
-from snake_control.nodes.bus_loop import Snapshot, State
+from snake_control.nodes.bus_snapshot import Snapshot, State
 
 _STATE_LEVELS = {
     State.STOPPED: Level.ERROR,

@@ -1,0 +1,46 @@
+"""What the bus thread tells the rest of the driver after each cycle."""
+
+from __future__ import annotations
+
+import dataclasses
+import enum
+
+from snake_control.ax12.chain import JointReading
+
+
+class State(enum.IntEnum):
+    """What the driver does with commands; the numbers of snake_interfaces/BusState."""
+
+    INACTIVE = 0
+    HOLDING = 1
+    MOVING = 2
+    TORQUE_OFF = 3
+    STOPPED = 4
+    EMERGENCY_STOP = 5
+
+
+@dataclasses.dataclass(frozen=True)
+class Snapshot:
+    """The bus after one cycle.
+
+    Attributes:
+        state, text: what is done with commands, and why.
+        read_at: middle of the read cycle on the monotonic clock [s].
+        readings: one per joint.
+        armed: whether torque is on.
+        cycle_time: from the first byte to the last [s].
+        cycle_rate: measured [Hz].
+        command_age: [s], infinite without a command.
+        cycles, late_cycles: since activation.
+    """
+
+    state: State
+    text: str
+    read_at: float
+    readings: tuple[JointReading, ...]
+    armed: bool
+    cycle_time: float
+    cycle_rate: float
+    command_age: float
+    cycles: int
+    late_cycles: int
