@@ -150,6 +150,16 @@ def test_a_power_cycle_ends_a_shut_down():
     assert (servo.error, servo.registers["torque_limit"]) == (OK, 1023)
 
 
+def test_a_power_cycle_starts_the_time_of_an_overload_anew():
+    servo = holding()
+    run(servo, 1.5, load_nm=2.0)
+    servo.power_cycle()
+    servo.store("torque_enable", 1)
+    run(servo, 1.5, load_nm=2.0)
+
+    assert servo.error == OK
+
+
 def test_output_warms_with_its_square_and_one_time_constant():
     parameters = HealthParameters(20.0, 80.0, 100.0)
     health = Health(20.0)

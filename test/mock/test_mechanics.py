@@ -88,6 +88,7 @@ def test_the_speed_changes_no_faster_than_the_acceleration():
     run(moved, 0.05)
 
     assert moved.motion.speed_rad_s == pytest.approx(0.05 * 60.0)
+    assert moved.motion.angle_rad == pytest.approx(0.5 * 60.0 * 0.05**2)
 
 
 def test_attainable_speed_falls_with_the_load():
