@@ -37,7 +37,7 @@ class ConfigFileError(SnakeError, ValueError):
 
 
 class ModelError(SnakeError, ValueError):
-    """A model quantity was asked for with an argument of the wrong shape or without a finite value."""
+    """A model quantity was asked for with an argument of wrong shape or without a finite value."""
 
 
 class SingularError(SnakeError, ArithmeticError):
