@@ -61,10 +61,7 @@ def run(make_node: Callable[[], Node], arguments: Sequence[str] | None = None) -
     try:
         # rclpy's own handlers would shut the context down before the node can close in order.
         rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
-    except (
-        rclpy_implementation.RCLInvalidROSArgsError,
-        rclpy_implementation.UnknownROSArgsError,
-    ) as error:
+    except (rclpy_implementation.RCLError, rclpy_implementation.UnknownROSArgsError) as error:
         print(f"configuration error: {error}", file=sys.stderr)
         return EXIT_BAD_CONFIG
     node: Node | None = None

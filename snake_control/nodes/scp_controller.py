@@ -78,7 +78,7 @@ class ScpControllerNode(Node):
             (topics.HEAD_ODOMETRY, self._head),
             (topics.HEAD_REFERENCE, self._reference),
         ):
-            self.create_subscription(topic.type, topic.name, source.receive, topic.qos)
+            self.create_subscription(topic.type, topic.name, source.receive, topic.newest_only)
 
         t = topics.JOINT_VELOCITY_COMMAND
         self._command = self.create_publisher(t.type, t.name, t.qos)

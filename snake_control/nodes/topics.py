@@ -39,6 +39,16 @@ class Topic:
     type: type
     qos: QoSProfile
 
+    @property
+    def newest_only(self) -> QoSProfile:
+        """QoS of a subscriber that is late: it takes the newest message, and no old ones first."""
+        return QoSProfile(
+            history=HistoryPolicy.KEEP_LAST,
+            depth=1,
+            reliability=self.qos.reliability,
+            durability=self.qos.durability,
+        )
+
 
 @dataclasses.dataclass(frozen=True)
 class Service:

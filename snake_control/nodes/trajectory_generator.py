@@ -59,7 +59,7 @@ class TrajectoryGenerator(Node):
         t = topics.HEAD_PLANNED_PATH
         self._path = self.create_publisher(t.type, t.name, t.qos)
         t = topics.HEAD_ODOMETRY
-        self.create_subscription(t.type, t.name, self._head.receive, t.qos)
+        self.create_subscription(t.type, t.name, self._head.receive, t.newest_only)
         t = topics.CMD_VEL
         self.create_subscription(t.type, t.name, self._on_cmd_vel, t.qos)
         self.create_service(topics.START.type, topics.START.name, self._on_start)
