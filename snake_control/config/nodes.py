@@ -22,7 +22,7 @@ class BusDriverConfig:
         0.1, "without a command this fresh the joints hold [s]", low=0.02, high=1.0
     )
     reply_timeout_s: float = parameter(
-        0.008, "how long to wait for a reply beyond its time on the wire [s]", low=0.001, high=0.1
+        0.015, "how long to wait for a reply beyond its time on the wire [s]", low=0.001, high=0.1
     )
     retries: int = parameter(1, "how often a missed reply is asked for again", low=0, high=5)
     lost_after_misses: int = parameter(
