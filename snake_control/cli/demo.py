@@ -49,6 +49,7 @@ _SERVICE_TIMEOUT_S = 3.0
 _NODE_STOP_TIMEOUT_S = 8.0
 _AFTER_FALL_S = 2.0
 _GATHER_S = 0.04
+_TAKE_S = 0.002
 _BUS_STATES = {
     BusState.STATE_INACTIVE: "inactive",
     BusState.STATE_HOLDING: "holding",
@@ -302,7 +303,8 @@ class Demo:
         before = -1
         while recorder.received > before:
             before = recorder.received
-            self._executor.spin_once(timeout_sec=0.0)
+            # With a timeout of 0 rclpy returns at its own wake-ups and leaves messages waiting.
+            self._executor.spin_once(timeout_sec=_TAKE_S)
 
     def _check(self) -> None:
         if self._signal is not None:

@@ -42,6 +42,7 @@ class BusTotals:
         replies, misses, retries, corrupt_replies, invalid_values: sums over all servos.
         lost: joints (numbers) whose servo did not answer for some time.
         duration_s: time over which the cycles were observed.
+        unheard: cycles in that time whose state did not arrive.
     """
 
     cycle_times_s: Sequence[float]
@@ -54,6 +55,7 @@ class BusTotals:
     invalid_values: int
     lost: tuple[int, ...]
     duration_s: float
+    unheard: int = 0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -215,13 +217,15 @@ def _control(series: Series) -> dict[str, Any]:
 def _bus(bus: BusTotals) -> dict[str, Any]:
     asked = bus.replies + bus.misses
     times = np.asarray(bus.cycle_times_s, dtype=float)
-    rate = (len(times) - 1) / bus.duration_s if len(times) > 1 and bus.duration_s > 0 else None
+    periods = len(times) + bus.unheard - 1
+    rate = periods / bus.duration_s if periods > 0 and bus.duration_s > 0 else None
     return {
         "rate_hz": rate,
         "cycle_time_p50_s": _percentile(times, 50),
         "cycle_time_p99_s": _percentile(times, 99),
         "cycles": bus.cycles,
         "late_cycles": bus.late_cycles,
+        "unheard_cycles": bus.unheard,
         "replies": bus.replies,
         "missed_replies": bus.misses,
         "missed_replies_fraction": bus.misses / asked if asked else None,

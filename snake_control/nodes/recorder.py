@@ -64,6 +64,7 @@ class Recorder:
         self._truth: deque[tuple[int, PlantState]] = deque(maxlen=_GROUND_TRUTH_KEPT)
         self._cycle_times_s: list[float] = []
         self._first_bus_ns: int | None = None
+        self._first_cycle = 0
         self._last_bus_ns = 0
         self._lost: set[int] = set()
         for topic, callback in (
@@ -89,6 +90,8 @@ class Recorder:
             return None
         servos = self.bus.servos
         started_ns = self._last_bus_ns if self._first_bus_ns is None else self._first_bus_ns
+        heard = len(self._cycle_times_s)
+        ran = self.bus.cycles - self._first_cycle + 1 if heard else 0
         return BusTotals(
             cycle_times_s=tuple(self._cycle_times_s),
             cycles=self.bus.cycles,
@@ -100,6 +103,7 @@ class Recorder:
             invalid_values=sum(servo.invalid_values for servo in servos),
             lost=tuple(sorted(self._lost)),
             duration_s=(self._last_bus_ns - started_ns) * 1e-9,
+            unheard=max(0, ran - heard),
         )
 
     def _take_bus(self, message: BusState) -> None:
@@ -110,6 +114,7 @@ class Recorder:
         self._last_bus_ns = _nanoseconds(message)
         if self._first_bus_ns is None:
             self._first_bus_ns = self._last_bus_ns
+            self._first_cycle = message.cycles
         self._cycle_times_s.append(message.cycle_time)
         self._lost |= {_joint(servo.joint) for servo in message.servos if not servo.online}
 

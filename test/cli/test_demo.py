@@ -111,6 +111,7 @@ def test_demo_follows_the_reference_and_leaves_all_results(start):
     assert summary["stop_findings"] == []
     assert summary["bus"]["servos_lost"] == 0
     assert summary["bus"]["corrupt_replies"] == 0
+    assert summary["bus"]["unheard_cycles"] < 0.1 * summary["bus"]["cycles"]
     assert summary["tracking_error_source"] == "ground truth"
     # The head has come nearer to the reference: it starts 0.1 m too high.
     assert abs(summary["tracking_error_final"]["z_h_m"]) < 0.03

@@ -158,10 +158,12 @@ def test_bus_figures():
         corrupt_replies=1,
         invalid_values=0,
         lost=(4,),
-        duration_s=1.98,
+        duration_s=2.0,
+        unheard=1,
     )
     bus = summarise(series_of([0.0]), Run(3, K, "x", {}, totals))["bus"]
     assert bus["rate_hz"] == pytest.approx(50.0)
+    assert bus["unheard_cycles"] == 1
     assert bus["cycle_time_p50_s"] == 0.005
     assert bus["cycle_time_p99_s"] == pytest.approx(0.007 + 0.01 * 0.002)
     assert bus["missed_replies"] == 5

@@ -164,3 +164,7 @@ def test_bus_totals_count_what_was_seen_while_recording(wired):
     assert (totals.replies, totals.misses, totals.retries) == (1100, 10, 11)
     assert (totals.cycles, totals.late_cycles) == (13, 2)
     assert totals.lost == (4,)
+    assert totals.unheard == 0
+    message = bus_state(1.2, cycles=17)
+    wired.send_and_wait(message, lambda: recorder.bus.cycles == 17, "a state after a gap")
+    assert recorder.bus_totals().unheard == 3
