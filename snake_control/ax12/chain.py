@@ -199,12 +199,15 @@ class ServoChain:
         count = len(self._servos)
         first = self._read_first
         self._read_first = 0
+        missed = 0
         for step in range(count):
             index = (first + step) % count
             if step and self._clock() >= until:
-                self._read_first = index
+                # Every other time begin with the servo that took the time: always the last one
+                # in its cycle, it would have the least chance to be heard.
+                self._read_first = (index - 1) % count if missed % 2 else index
                 break
-            self._read_one(self._servos[index], until)
+            missed = self._read_one(self._servos[index], until)
         self._cycles += 1
         if self._armed and self._cycles % _CHECK_EVERY_CYCLES == 0 and self._clock() < until:
             self._check_next = (self._check_next + 1) % count
@@ -235,9 +238,10 @@ class ServoChain:
             )
         return self._finding
 
-    def _read_one(self, servo: _Servo, until: float) -> None:
+    def _read_one(self, servo: _Servo, until: float) -> int:
+        """Read a servo that is not lost; return how often in a row it did not answer."""
         if self._is_lost(servo):
-            return
+            return 0
         servo_id = servo.joint.servo_id
         counters = self._bus.counters.get(servo_id)
         begin = self._clock()
@@ -245,10 +249,11 @@ class ServoChain:
         retries = None if (counters is None or not counters.misses_in_row) and begin < until else 0
         reply = self._bus.read(servo_id, *ct.FEEDBACK_BLOCK, retries)
         if reply is None:
-            return
+            return self._bus.counters[servo_id].misses_in_row
         servo.feedback.take(reply.data, reply.error_bits, 0.5 * (begin + self._clock()))
         alarmed = reply.error_bits & servo.info.shutdown_bits
         servo.alarms_in_row = servo.alarms_in_row + 1 if alarmed else 0
+        return 0
 
     def _is_lost(self, servo: _Servo) -> bool:
         counters = self._bus.counters.get(servo.joint.servo_id)

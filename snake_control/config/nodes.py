@@ -26,7 +26,7 @@ class BusDriverConfig:
     )
     retries: int = parameter(1, "how often a missed reply is asked for again", low=0, high=5)
     lost_after_misses: int = parameter(
-        10, "missed reads in a row after which a servo counts as lost", low=1, high=1000
+        25, "missed reads in a row after which a servo counts as lost", low=1, high=1000
     )
     look_ahead_s: float = parameter(
         0.15,
