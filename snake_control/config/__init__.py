@@ -5,6 +5,7 @@ config = load("config/paper_robot.yaml", "config/mock.yaml")
 config.robot.links
 """
 
+from snake_control.config.command_line import parameter_files, parameters_of_node
 from snake_control.config.loader import (
     Config,
     from_parameters,
@@ -41,6 +42,8 @@ __all__ = [
     "known_parameters",
     "load",
     "matches",
+    "parameter_files",
+    "parameters_of_node",
     "read_sections",
     "refuse_unknown",
 ]

@@ -58,6 +58,20 @@ def read_sections(path: str | Path) -> list[tuple[str, dict[str, Any]]]:
     ]
 
 
+def read_value(field: str, text: str) -> Any:
+    """Return the value of a ``-p name:=value`` rule.
+
+    Raises:
+        ConfigError: no YAML, or a list that rcl would abort on.
+    """
+    try:
+        value = yaml.load(text, Loader=_RclLoader)
+    except yaml.YAMLError as error:
+        raise ConfigError(field, text, "give a value in YAML") from error
+    _check_as_rcl(field, value)
+    return value
+
+
 def _sections(
     path: str | Path, prefix: str, tree: Mapping[Any, Any]
 ) -> list[tuple[str, Mapping[str, Any]]]:
