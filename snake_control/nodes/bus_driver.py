@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import sys
 import time
+from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.duration import Duration
@@ -39,14 +40,14 @@ _LOG_PERIOD_S = 1.0
 class BusDriver(LifecycleNode):
     """The driver as a lifecycle node."""
 
-    def __init__(self) -> None:
+    def __init__(self, **overrides: Any) -> None:
         """Declare parameters, topics and services; with ``autostart``, configure and activate.
 
         Raises:
             ConfigError: a parameter.
             BusError, ServoError: autostart failed; no servo was armed.
         """
-        super().__init__("bus_driver", automatically_declare_parameters_from_overrides=True)
+        super().__init__("bus_driver", **overrides)
         self._config = NodeParameters(self, "bus_driver").config
         driver, names = self._config.bus_driver, self._config.robot.joint_names
         self._messages = StateMessages(names, self._config.servos.ids)
@@ -193,9 +194,7 @@ class BusDriver(LifecycleNode):
 
     # Services.
 
-    def _set_torque(
-        self, request: SetBool.Request, response: SetBool.Response
-    ) -> SetBool.Response:
+    def _set_torque(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
         done = "torque is on, holding" if request.data else "torque is off"
         return self._answer(response, lambda: self._loop.set_torque(request.data), done)
 
@@ -231,7 +230,7 @@ class BusDriver(LifecycleNode):
 def main() -> int:
     """Run the node; return the exit code."""
     sys.setswitchinterval(_THREAD_SWITCH_S)
-    return run(BusDriver)
+    return run(BusDriver, "bus_driver")
 
 
 if __name__ == "__main__":

@@ -169,7 +169,6 @@ class BusLoop:
         except TimeoutError as error:
             raise RefusedError(f"not carried out within {_REQUEST_TIMEOUT_S:g} s") from error
 
-
     def _run(self) -> None:
         self._schedule.start(time.monotonic())
         while not self._stopping:

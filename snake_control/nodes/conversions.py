@@ -141,9 +141,7 @@ def head_motion(message: Odometry, frame_id: str) -> tuple[Array, Array]:
 
 def reference_message(reference: Reference, stamp: int, frame_id: str) -> HeadReference:
     """Return a reference for the time ``stamp`` [ns] as a message, twist in ``frame_id``."""
-    message = HeadReference(
-        header=header(stamp, frame_id), pose=pose_message(reference.w_d)
-    )
+    message = HeadReference(header=header(stamp, frame_id), pose=pose_message(reference.w_d))
     message.twist.linear = vector(reference.w_d_dot[:3])
     message.twist.angular = vector(rpy_rate_map(reference.w_d[3:]) @ reference.w_d_dot[3:])
     return message

@@ -9,6 +9,7 @@ import threading
 import time
 from array import array
 from collections import deque
+from typing import Any
 
 import numpy as np
 from geometry_msgs.msg import PoseStamped
@@ -47,14 +48,14 @@ class MockBus(Node):
     snapshot of the body, and publishes on time whatever the executor does.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, **overrides: Any) -> None:
         """Start everything.
 
         Raises:
             ConfigError: a parameter that is not allowed.
             BusError: the port's link cannot be put in place.
         """
-        super().__init__("mock_bus", automatically_declare_parameters_from_overrides=True)
+        super().__init__("mock_bus", **overrides)
         config = NodeParameters(self, "mock_bus").config
         self._robot, self._own = config.robot, config.mock_bus
         *servo_rngs, mocap_rng = _generators(self._own.seed, config.robot.joints + 1)
@@ -241,7 +242,7 @@ def _servo_parameters(own: MockBusConfig) -> ServoParameters:
 
 def main() -> int:
     """Run the node."""
-    return run(MockBus)
+    return run(MockBus, "mock_bus")
 
 
 if __name__ == "__main__":

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import collections
+from typing import Any
 
 from geometry_msgs.msg import PoseStamped
 from rclpy.node import Node
@@ -21,8 +22,8 @@ _RATE_WINDOW_NS = 1_000_000_000
 class PoseInput(Node):
     """Filters ``mocap/pose``; a pose that is refused leads to no odometry, only to a status."""
 
-    def __init__(self) -> None:
-        super().__init__("pose_input", automatically_declare_parameters_from_overrides=True)
+    def __init__(self, **overrides: Any) -> None:
+        super().__init__("pose_input", **overrides)
         self._config = NodeParameters(self, "pose_input").config.pose_input
         self._timeout_ns = round(self._config.timeout_s * 1e9)
         self._filter = HeadFilter(self._config.cutoff_hz, self._config.timeout_s)
@@ -139,7 +140,7 @@ class PoseInput(Node):
 
 def main() -> int:
     """Run the node."""
-    return run(PoseInput)
+    return run(PoseInput, "pose_input")
 
 
 if __name__ == "__main__":

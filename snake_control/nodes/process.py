@@ -13,9 +13,10 @@ import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 
-from snake_control.config import load
+from snake_control.config import load, parameter_files, parameters_of_node
 from snake_control.errors import ConfigError, SnakeError
 
 EXIT_BAD_CONFIG = 2
@@ -29,20 +30,17 @@ class Runnable(Protocol):
         """Bring the hardware to rest and release it; ROS still works at this time."""
 
 
-def parameter_files(arguments: Sequence[str]) -> list[str]:
-    """Return the files given with ``--params-file``, in order."""
-    return [
-        arguments[i + 1]
-        for i, argument in enumerate(arguments[:-1])
-        if argument == "--params-file"
-    ]
-
-
-def run(make_node: Callable[[], Node], arguments: Sequence[str] | None = None) -> int:
+def run(make_node: Callable[..., Node], kind: str, arguments: Sequence[str] | None = None) -> int:
     """Make a node, spin it until a signal or a shutdown, close it; return the exit code.
 
     Files are validated before rcl reads them, because rcl aborts on some mistakes without saying
-    which field is wrong.
+    which field is wrong. What they and ``-p`` give to this node is handed to it in the order of
+    the command line (``parameters_of_node`` says why).
+
+    Args:
+        make_node: called with the keyword arguments that rclpy's ``Node`` takes for overrides.
+        kind: name of the node unless the command line renames it.
+        arguments: command line; ``None`` for the process's own.
     """
     arguments = list(sys.argv if arguments is None else arguments)
     stop = threading.Event()
@@ -54,6 +52,7 @@ def run(make_node: Callable[[], Node], arguments: Sequence[str] | None = None) -
     signal.signal(signal.SIGTERM, on_signal)
     try:
         load(*parameter_files(arguments))
+        given = parameters_of_node(arguments, kind)
     except SnakeError as error:
         print(f"configuration error: {error}", file=sys.stderr)
         return EXIT_BAD_CONFIG
@@ -66,7 +65,11 @@ def run(make_node: Callable[[], Node], arguments: Sequence[str] | None = None) -
         return EXIT_BAD_CONFIG
     node: Node | None = None
     try:
-        node = make_node()
+        node = make_node(
+            parameter_overrides=[Parameter(name, value=value) for name, value in given.items()],
+            # That is how parameters that nobody knows come to light.
+            automatically_declare_parameters_from_overrides=True,
+        )
         executor = SingleThreadedExecutor()
         executor.add_node(node)
         while rclpy.ok() and not stop.is_set():

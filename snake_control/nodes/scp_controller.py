@@ -7,6 +7,7 @@ the controller is alive; and a ``controller_state`` with a status that names wha
 from __future__ import annotations
 
 import time
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,8 +45,8 @@ _GOOD = (ControllerState.STATUS_TRACKING, ControllerState.STATUS_LIMITED)
 class ScpControllerNode(Node):
     """Runs ``ScpController`` at a fixed rate on the newest inputs."""
 
-    def __init__(self) -> None:
-        super().__init__("scp_controller", automatically_declare_parameters_from_overrides=True)
+    def __init__(self, **overrides: Any) -> None:
+        super().__init__("scp_controller", **overrides)
         config = NodeParameters(self, "scp_controller", self._on_parameters).config
         self._robot = config.robot
         self._own = own = config.scp_controller
@@ -184,9 +185,7 @@ class ScpControllerNode(Node):
             found += markers.robot_markers(self._robot, q, now, frame)
         if not self._reference.problem(now):
             length = 4 * self._robot.half_length_m
-            found.append(
-                markers.reference_marker(self._reference.value.w_d, now, frame, length)
-            )
+            found.append(markers.reference_marker(self._reference.value.w_d, now, frame, length))
         if found:
             self._markers.publish(markers.marker_array(found))
 
@@ -198,7 +197,7 @@ class ScpControllerNode(Node):
 
 def main() -> int:
     """Run the node."""
-    return run(ScpControllerNode)
+    return run(ScpControllerNode, "scp_controller")
 
 
 if __name__ == "__main__":

@@ -7,6 +7,8 @@ reports a stale reference and commands zero. ``cmd_vel`` takes over from whateve
 
 from __future__ import annotations
 
+from typing import Any
+
 from geometry_msgs.msg import PoseStamped, TwistStamped
 from nav_msgs.msg import Path
 from numpy import float64
@@ -37,10 +39,8 @@ _ENDLESS_PATH_S = 60.0
 class TrajectoryGenerator(Node):
     """Samples a ``ReferenceSequence`` at a fixed rate."""
 
-    def __init__(self) -> None:
-        super().__init__(
-            "trajectory_generator", automatically_declare_parameters_from_overrides=True
-        )
+    def __init__(self, **overrides: Any) -> None:
+        super().__init__("trajectory_generator", **overrides)
         config = NodeParameters(self, "trajectory_generator").config.trajectory_generator
         self._config = config
         self._sequence = ReferenceSequence(config)
@@ -163,7 +163,7 @@ class TrajectoryGenerator(Node):
 
 def main() -> int:
     """Run the node."""
-    return run(TrajectoryGenerator)
+    return run(TrajectoryGenerator, "trajectory_generator")
 
 
 if __name__ == "__main__":

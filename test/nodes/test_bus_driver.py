@@ -303,9 +303,7 @@ def turn_joint_11_into_a_wheel(port: Path) -> None:
 
 def test_one_joint_in_wheel_mode(tmp_path: Path) -> None:
     modes = {"servos": {"velocity_modes": ["joint"] * 10 + ["wheel"]}}
-    with DrivenRobot(
-        tmp_path, driver=modes, before_driver=turn_joint_11_into_a_wheel
-    ) as robot:
+    with DrivenRobot(tmp_path, driver=modes, before_driver=turn_joint_11_into_a_wheel) as robot:
         robot.wait_for_state(BusState.STATE_HOLDING)
         robot.command(joint_11=1.5, joint_7=0.2)
         robot.wait_for_state(BusState.STATE_MOVING)

@@ -137,9 +137,7 @@ def test_bad_joint_states_are_refused(changes, text):
         c.joint_motion(JointState(**(good | changes)), NAMES)
 
 
-@pytest.mark.parametrize(
-    ("frame", "heading"), [("", False), ("world", False), ("link_1", True)]
-)
+@pytest.mark.parametrize(("frame", "heading"), [("", False), ("world", False), ("link_1", True)])
 def test_frame_of_cmd_vel(frame, heading):
     message = TwistStamped(header=c.header(0, frame))
     message.twist.linear.x = 0.1

@@ -31,6 +31,18 @@ def test_a_later_file_wins_and_sets_the_weights(running):
     assert running.get_parameter(NODE, "controller.b_prime") == 0.0
 
 
+def test_the_command_line_counts_from_left_to_right(tmp_path):
+    """rcl would let the file's section for the node win over -p, and over a later /** section."""
+    own = tmp_path / "own.yaml"
+    own.write_text("/**/pose_input: {ros__parameters: {cutoff_hz: 5.0, timeout_s: 0.2}}\n")
+    later = tmp_path / "later.yaml"
+    later.write_text("/**: {ros__parameters: {timeout_s: 0.3}}\n")
+    with Graph() as graph:
+        graph.start("pose_input", params_files=[own, later], params={"cutoff_hz": 7.0})
+        assert graph.get_parameter("pose_input", "cutoff_hz") == 7.0
+        assert graph.get_parameter("pose_input", "timeout_s") == 0.3
+
+
 def test_a_change_while_running_is_taken_and_the_weights_follow(running):
     result = running.set_parameters(NODE, controller__case=1)["controller__case"]
     assert result.successful, result.reason
@@ -174,9 +186,7 @@ def test_sections_of_other_packages_and_of_a_renamed_node(tmp_path):
 def test_signals_end_a_node_in_order(kind, signal_name):
     with Graph() as graph:
         process = graph.start(kind, params_files=[PAPER_ROBOT])
-        graph.wait_for(
-            lambda: kind in graph.node.get_node_names(), 30.0, f"{kind} in the graph"
-        )
+        graph.wait_for(lambda: kind in graph.node.get_node_names(), 30.0, f"{kind} in the graph")
         getattr(process, signal_name)()
         assert process.wait() == 0
         assert "Traceback" not in process.output()

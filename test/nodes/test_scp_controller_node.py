@@ -184,9 +184,7 @@ def test_yaw_goes_on_across_half_a_turn(rig):
         rig.w[5] = yaw
         rig.repair()
         state = rig.graph.wait_for(
-            lambda yaw=yaw: (last := rig.states.last)
-            and abs(last.w[5] - yaw) < 1e-9
-            and last,
+            lambda yaw=yaw: (last := rig.states.last) and abs(last.w[5] - yaw) < 1e-9 and last,
             10.0,
             f"yaw {yaw:.2f}",
         )

@@ -36,8 +36,10 @@ def test_tracks_table_1_and_a_killed_controller_stops_the_joints(tmp_path):
         assert np.abs(np.array(robot.truth.last.phi) - posture).max() > 0.1
         assert not robot.truth.last.fallen
         robot.graph.wait_for(
-            lambda: speed(robot.truth.last) > AT_REST_RAD_S
-            and all(np.any(command.velocity) for command in robot.commands.messages[-5:]),
+            lambda: (
+                speed(robot.truth.last) > AT_REST_RAD_S
+                and all(np.any(command.velocity) for command in robot.commands.messages[-5:])
+            ),
             20.0,
             "commanded motion",
         )

@@ -64,9 +64,7 @@ class ControllerRig:
         self.head: Odometry | None = head
         self.reference: HeadReference | None = reference_message(self.table_1, 0, "world")
 
-    def wait_status(
-        self, *statuses: int, what: str, texts: Sequence[str] = ()
-    ) -> ControllerState:
+    def wait_status(self, *statuses: int, what: str, texts: Sequence[str] = ()) -> ControllerState:
         """Wait for a state, sent from now on, with one of ``statuses`` and all ``texts``."""
         now = self.graph.now_ns()
 

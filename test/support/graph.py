@@ -1,9 +1,9 @@
 """A ROS graph of its own for one test: node processes, recorders, publishers, service calls.
 
-    with Graph() as graph:
-        controller = graph.start("scp_controller", params_files=[PAPER_ROBOT])
-        states = graph.subscribe(CONTROLLER_STATE)
-        graph.wait_for(lambda: states.messages, 20.0, "the first controller_state")
+with Graph() as graph:
+    controller = graph.start("scp_controller", params_files=[PAPER_ROBOT])
+    states = graph.subscribe(CONTROLLER_STATE)
+    graph.wait_for(lambda: states.messages, 20.0, "the first controller_state")
 """
 
 from __future__ import annotations
@@ -146,18 +146,15 @@ class Graph:
         Args:
             kind: ``bus_driver``, ``scp_controller``, ...
             params_files: given as ``--params-file``, in this order.
-            params: single parameters, which win over the files. (As ``-p name:=value`` they would
-                not: rcl lets a file's section for one node win over them.)
+            params: single parameters, which win over the files.
             arguments: further ROS arguments, such as ``["-r", "__node:=other"]``.
         """
         ros = ["--ros-args"]
         for path in params_files:
             ros += ["--params-file", str(path)]
-        if params:
+        for parameter, value in (params or {}).items():
             # JSON is YAML as rcl reads it.
-            path = Path(self._directory.name) / f"{len(self._processes)}_{kind}.yaml"
-            path.write_text(json.dumps({f"/**/{kind}": {"ros__parameters": dict(params)}}))
-            ros += ["--params-file", str(path)]
+            ros += ["-p", f"{parameter}:={json.dumps(value)}"]
         ros += arguments
         return self.run(f"snake_control.nodes.{kind}", ros, name=kind)
 

@@ -35,9 +35,7 @@ def ax12_memory(servo_id: int, position: int = 512) -> bytearray:
         (12, 0, 24, servo_id, 1, 250, 0, 0, 0xFF, 3, 0, 70, 60, 140, 0xFF, 3, 2, 36, 36)
     )
     memory[24:36] = bytes((0, 0, 1, 1, 32, 32, *position.to_bytes(2, "little"), 0, 0, 0xFF, 3))
-    memory[36:50] = bytes(
-        (*position.to_bytes(2, "little"), 0, 0, 0, 0, 111, 40, 0, 0, 0, 0, 32, 0)
-    )
+    memory[36:50] = bytes((*position.to_bytes(2, "little"), 0, 0, 0, 0, 111, 40, 0, 0, 0, 0, 32, 0))
     return memory
 
 

@@ -42,7 +42,11 @@ class WholeGraph:
             self._cmd_vel = graph.publisher(topics.CMD_VEL)
             self.processes = {}
             for kind in (
-                "mock_bus", "bus_driver", "pose_input", "scp_controller", "trajectory_generator",
+                "mock_bus",
+                "bus_driver",
+                "pose_input",
+                "scp_controller",
+                "trajectory_generator",
             ):
                 port = {"port": str(self._port)} if kind in ("mock_bus", "bus_driver") else None
                 self.processes[kind] = graph.start(
@@ -57,15 +61,15 @@ class WholeGraph:
                 "a valid head pose",
             )
             graph.wait_for(
-                lambda: self.truth.last
-                and self.states.last
-                and self.states.last.text == "waiting for head/reference",
+                lambda: (
+                    self.truth.last
+                    and self.states.last
+                    and self.states.last.text == "waiting for head/reference"
+                ),
                 20.0,
                 "the controller waiting for a reference only",
             )
-            graph.wait_for(
-                self._cmd_vel.get_subscription_count, 20.0, "the trajectory generator"
-            )
+            graph.wait_for(self._cmd_vel.get_subscription_count, 20.0, "the trajectory generator")
             graph.every(0.05, self._publish)
         except BaseException:
             graph.__exit__(None, None, None)
