@@ -125,11 +125,7 @@ class SerialPort(PortHandler):  # type: ignore[misc]
 
     def isPacketTimeout(self) -> bool:
         """Whether the reply is overdue."""
-        return (
-            self._read_after_deadline
-            and not self._unread
-            and time.monotonic() >= self._deadline
-        )
+        return self._read_after_deadline and not self._unread and time.monotonic() >= self._deadline
 
     def _lower_latency(self, path: str) -> None:
         # Only USB serial adapters with a timer know it.

@@ -32,9 +32,7 @@ def test_given_line_needs_no_head_pose():
     sequence = make()
     outcome = sequence.start(10.0, None)
     assert outcome.done
-    np.testing.assert_allclose(
-        sequence.sample(12.0).w_d, TABLE_1_START + 2 * TABLE_1_VELOCITY
-    )
+    np.testing.assert_allclose(sequence.sample(12.0).w_d, TABLE_1_START + 2 * TABLE_1_VELOCITY)
     assert sequence.line is not None
 
 
