@@ -93,6 +93,8 @@ class ScpController:
         del q_dot, t
         g = geometry(self._robot, q)
         k = kinematics(g)
+        # Raises in a singular head posture, where the costs would divide by V_h = 0.
+        _ = k.F_bar
         cost = costs(g, k)
         w, phi = g.q[:6], g.q[6:]
         error = w - reference.w_d
