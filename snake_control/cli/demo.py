@@ -215,7 +215,7 @@ class Demo:
     def _watch(self, recorder: Recorder) -> Outcome:
         duration_s = self._arguments.duration_s
         seen, heard = 0, time.monotonic()
-        fell_at_s: float | None = None
+        told = False
         while True:
             self._take_all(recorder)
             now = time.monotonic()
@@ -235,10 +235,12 @@ class Demo:
                 continue
             if self._progress.due:
                 self._progress.show(_progress_text(step, duration_s))
-            if step.fallen and fell_at_s is None:
-                fell_at_s = step.t_s
-                self._progress.say(f"the robot fell at {fell_at_s:.1f} s")
-            outcome = outcome_at(step.t_s, fell_at_s, duration_s, self._config.controller.case)
+            if recorder.fell_at_s is not None and not told:
+                told = True
+                self._progress.say(f"the robot fell at {recorder.fell_at_s:.1f} s")
+            outcome = outcome_at(
+                step.t_s, recorder.fell_at_s, duration_s, self._config.controller.case
+            )
             if outcome is not None:
                 return outcome
 

@@ -48,6 +48,7 @@ class Recorder:
         head: latest status of the head pose, ``None`` before the first.
         controller: latest controller state, ``None`` before the first.
         latest: newest row of the series, ``None`` before the first.
+        fell_at_s: time of the first row in which the robot had fallen [s], ``None`` before.
     """
 
     def __init__(self, node: Node, series: Series) -> None:
@@ -57,6 +58,7 @@ class Recorder:
         self.head: PoseStatus | None = None
         self.controller: ControllerState | None = None
         self.latest: Step | None = None
+        self.fell_at_s: float | None = None
         self._series = series
         self._recording = False
         self._zero_ns: int | None = None
@@ -152,6 +154,8 @@ class Recorder:
             t_s = (stamp - self._zero_ns) * 1e-9
             self.latest = _step(t_s, controller, bus, _truth_at(stamp, self._truth))
             self._series.append(self.latest)
+            if self.latest.fallen and self.fell_at_s is None:
+                self.fell_at_s = t_s
 
 
 @dataclasses.dataclass(frozen=True)
