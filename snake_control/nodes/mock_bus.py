@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import math
 import sys
 import threading
@@ -94,8 +93,6 @@ class MockBus(Node):
         bus = Bus(servos, wire_time=self._own.wire_time)
         self._server = Server(self._port, bus, self._simulation, time.monotonic)
         self._reporter = threading.Thread(target=self._report, name="reporter", daemon=True)
-        # What exists by now stays; to search it for garbage would hold replies up for milliseconds.
-        gc.freeze()
         self._server.start()
         self._reporter.start()
         self.get_logger().info(
@@ -224,7 +221,10 @@ def _servos(config: Config, mountings: list[Mounting], rngs: list[Generator]) ->
                 starts[i],
                 f"servo {servo_id} would start at {angle:.3g} rad, beyond its sensor's +-2.62",
             )
-        servos.append(Servo(servo_id, parameters, angle_rad=angle, eeprom=eeprom, rng=rng))
+        # A robot's servos have been set up for the mode that its configuration says.
+        wheel = config.servos.velocity_modes[i] == "wheel"
+        limits = {"cw_angle_limit": 0, "ccw_angle_limit": 0} if wheel else {}
+        servos.append(Servo(servo_id, parameters, angle_rad=angle, eeprom=eeprom | limits, rng=rng))
     return servos
 
 

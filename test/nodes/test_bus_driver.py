@@ -18,8 +18,6 @@ from lifecycle_msgs.msg import State, Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from snake_interfaces.msg import BusState
 
-from snake_control.ax12.bus import Bus
-from snake_control.ax12.port import SerialPort
 from snake_control.nodes import topics
 from support.driven_robot import NAMES, DrivenRobot, stamp
 
@@ -295,15 +293,9 @@ def test_no_port_gives_one_message_and_an_exit_code(tmp_path: Path) -> None:
         assert "Traceback" not in robot.driver.output()
 
 
-def turn_joint_11_into_a_wheel(port: Path) -> None:
-    bus = Bus(SerialPort(str(port), 1000000, reply_timeout_s=0.1), retries=3)
-    bus.write_verified(11, 6, bytes(4))
-    bus.close()
-
-
 def test_one_joint_in_wheel_mode(tmp_path: Path) -> None:
     modes = {"servos": {"velocity_modes": ["joint"] * 10 + ["wheel"]}}
-    with DrivenRobot(tmp_path, driver=modes, before_driver=turn_joint_11_into_a_wheel) as robot:
+    with DrivenRobot(tmp_path, driver=modes, mock=modes) as robot:
         robot.wait_for_state(BusState.STATE_HOLDING)
         robot.command(joint_11=1.5, joint_7=0.2)
         robot.wait_for_state(BusState.STATE_MOVING)

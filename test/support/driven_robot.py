@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -30,7 +30,6 @@ class DrivenRobot:
         driver: Mapping[str, Any] | None = None,
         mock: Mapping[str, Any] | None = None,
         with_mock: bool = True,
-        before_driver: Callable[[Path], None] | None = None,
     ) -> None:
         """Prepare.
 
@@ -38,7 +37,6 @@ class DrivenRobot:
             directory: for the port's link and the parameter file.
             driver, mock: parameters of the two nodes.
             with_mock: whether there is a mock from the start.
-            before_driver: called with the mock's port before the driver starts.
         """
         port = str(directory / "port")
         self.port = Path(port)
@@ -52,7 +50,6 @@ class DrivenRobot:
             )
         )
         self._with_mock = with_mock
-        self._before_driver = before_driver
         self._velocities: tuple[float, ...] | None = None
         self._lock = threading.Lock()
 
@@ -67,8 +64,6 @@ class DrivenRobot:
             self.graph.node.create_timer(0.02, self._publish)
             if self._with_mock:
                 self.start_mock()
-            if self._before_driver is not None:
-                self._before_driver(self.port)
             self.driver = self.start_driver()
         except BaseException:
             self.graph.__exit__(None, None, None)
