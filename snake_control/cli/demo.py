@@ -8,7 +8,6 @@ writes ``summary.json``, ``series.csv`` and the paper's figures.
 
 from __future__ import annotations
 
-import dataclasses
 import math
 import os
 import signal
@@ -21,7 +20,6 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
-import numpy as np
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
@@ -29,25 +27,30 @@ from snake_interfaces.msg import BusState, ControllerState, PoseStatus
 from std_srvs.srv import SetBool, Trigger
 
 from snake_control.cli.demo_arguments import DemoArguments, parse_arguments
+from snake_control.cli.demo_outcome import (
+    EXIT_FAILED,
+    EXIT_OK,
+    EXIT_USAGE,
+    Outcome,
+    outcome_at,
+    progress_text,
+)
 from snake_control.cli.node_processes import NodeProcesses
 from snake_control.cli.progress import ProgressLine
 from snake_control.cli.ros_domain import own_domain
 from snake_control.config import Config
 from snake_control.errors import NodeDiedError, NotReadyError, SnakeError
-from snake_control.experiment.series import Series, Step
+from snake_control.experiment.series import Series
 from snake_control.experiment.summary import Run, summarise, write_summary
 from snake_control.experiment.table import format_summary
-from snake_control.nodes.recorder import FOLLOWING, STATUS_WORDS, Recorder
+from snake_control.nodes.recorder import FOLLOWING, Recorder
 from snake_control.nodes.topics import ENABLE, START, STOP, Service
-
-EXIT_OK, EXIT_FAILED, EXIT_USAGE = 0, 1, 2
 
 _STOP_ORDER = ("scp_controller", "trajectory_generator", "pose_input", "bus_driver", "mock_bus")
 _READY_TIMEOUT_S = 40.0
 _SILENCE_TIMEOUT_S = 5.0
 _SERVICE_TIMEOUT_S = 3.0
 _NODE_STOP_TIMEOUT_S = 8.0
-_AFTER_FALL_S = 2.0
 _GATHER_S = 0.04
 _TAKE_S = 0.002
 _BUS_STATES = {
@@ -74,28 +77,6 @@ class StopRequested(Exception):  # noqa: N818 - not an error: somebody pressed C
     def __init__(self, number: int) -> None:
         self.number = number
         super().__init__(f"interrupted by {signal.Signals(number).name}")
-
-
-@dataclasses.dataclass(frozen=True)
-class Outcome:
-    """How a run ended: in words, and as an exit code."""
-
-    ended: str
-    exit_code: int
-
-
-def outcome_at(t_s: float, fell_at_s: float | None, duration_s: float, case: int) -> Outcome | None:
-    """Return how a run ends at time ``t_s``, ``None`` if it goes on.
-
-    A fall ends it a little later; in Case 1 a fall is what the paper found, and no failure.
-    """
-    if fell_at_s is not None and t_s >= min(fell_at_s + _AFTER_FALL_S, duration_s):
-        return Outcome(
-            f"the robot fell at {fell_at_s:.1f} s", EXIT_OK if case == 1 else EXIT_FAILED
-        )
-    if t_s >= duration_s:
-        return Outcome("duration reached", EXIT_OK)
-    return None
 
 
 class Demo:
@@ -234,7 +215,7 @@ class Demo:
             if step is None:
                 continue
             if self._progress.due:
-                self._progress.show(_progress_text(step, duration_s))
+                self._progress.show(progress_text(step, duration_s))
             if recorder.fell_at_s is not None and not told:
                 told = True
                 self._progress.say(f"the robot fell at {recorder.fell_at_s:.1f} s")
@@ -390,18 +371,6 @@ def _has_inputs(controller: ControllerState | None) -> bool:
         and math.isfinite(controller.joint_states_age)
         and math.isfinite(controller.head_age)
     )
-
-
-def _progress_text(step: Step, duration_s: float) -> str:
-    error = step.error
-    position_mm = 1e3 * float(np.linalg.norm(error[:3]))
-    rotation = float(np.abs(error[3:]).max())
-    d_min = step.d_min_true if math.isfinite(step.d_min_true) else step.d_min
-    text = (
-        f"{step.t_s:5.1f} / {duration_s:g} s   error {position_mm:6.1f} mm {rotation:.3f} rad   "
-        f"V_b1 {step.V_b1:8.2e}   d_min {1e3 * d_min:5.1f} mm   bus {step.bus_rate_hz:4.1f} Hz"
-    )
-    return text if step.status == STATUS_WORDS[FOLLOWING[0]] else f"{text}   {step.status}"
 
 
 @contextmanager

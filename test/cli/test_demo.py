@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from snake_control.cli.demo import Outcome, outcome_at
+from snake_control.cli.demo_outcome import Outcome, outcome_at
 from snake_control.config import RobotConfig
 from snake_control.experiment.series import Series
 from support.process import Process
