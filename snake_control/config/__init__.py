@@ -5,7 +5,11 @@ config = load("config/paper_robot.yaml", "config/mock.yaml")
 config.robot.links
 """
 
-from snake_control.config.command_line import parameter_files, parameters_of_node
+from snake_control.config.command_line import (
+    namespace_and_name,
+    parameter_files,
+    parameters_of_node,
+)
 from snake_control.config.loader import (
     Config,
     from_parameters,
@@ -42,6 +46,7 @@ __all__ = [
     "known_parameters",
     "load",
     "matches",
+    "namespace_and_name",
     "parameter_files",
     "parameters_of_node",
     "read_sections",

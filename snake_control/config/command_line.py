@@ -19,6 +19,19 @@ def parameter_files(arguments: Sequence[str]) -> list[str]:
     return [value for flag, value in _ros_options(arguments) if flag == "--params-file"]
 
 
+def namespace_and_name(arguments: Sequence[str], name: str) -> tuple[str, str]:
+    """Return a node's namespace and name after the remappings of its command line."""
+    namespace = "/"
+    for flag, value in _ros_options(arguments):
+        if flag in ("-r", "--remap"):
+            rule, _, replacement = value.partition(":=")
+            if rule.rpartition(":")[2] == "__node":
+                name = replacement
+            elif rule.rpartition(":")[2] == "__ns":
+                namespace = replacement
+    return namespace, name
+
+
 def parameters_of_node(arguments: Sequence[str], name: str) -> dict[str, Any]:
     """Return the parameters that a command line gives to a node, flat.
 
@@ -29,14 +42,7 @@ def parameters_of_node(arguments: Sequence[str], name: str) -> dict[str, Any]:
     Raises:
         ConfigFileError, ConfigError: as ``read_sections``; or a rule that is none.
     """
-    namespace = "/"
-    for flag, value in _ros_options(arguments):
-        if flag in ("-r", "--remap"):
-            rule, _, replacement = value.partition(":=")
-            if rule.rpartition(":")[2] == "__node":
-                name = replacement
-            elif rule.rpartition(":")[2] == "__ns":
-                namespace = replacement
+    namespace, name = namespace_and_name(arguments, name)
     full_name = f"{namespace.rstrip('/')}/{name}"
     found: dict[str, Any] = {}
     for flag, value in _ros_options(arguments):

@@ -42,15 +42,27 @@ def check_conditions(
     _check_axes(links, head_links, joint_axes)
     _check_wheelless(links, head_links, wheelless_links)
     _check_head_scps(head_links, head_scp_joints, joint_axes)
+    _check_redundancy(links, head_links, wheelless_links)
+
+
+def _check_redundancy(links: int, head_links: int, wheelless_links: Sequence[int]) -> None:
     m = head_links - 4 + len(wheelless_links)
-    if not 1 <= m < links - 7:
+    if 1 <= m < links - 7:
+        return
+    condition = "Condition 4: 1 <= m < n - 7 with m = (n_h - 4) + wheelless links"
+    fewest, most = max(0, 5 - head_links), links - 8 - (head_links - 4)
+    if most < fewest:
         raise ConfigError(
-            "robot.wheelless_links",
-            list(wheelless_links),
-            f"Condition 4: 1 <= m < n - 7 with m = (n_h - 4) + wheelless links; here m = {m} and "
-            f"n - 7 = {links - 7}, so the number of wheelless links must be "
-            f"{max(0, 5 - head_links)} to {links - 8 - (head_links - 4)}",
+            "robot.links",
+            links,
+            f"{condition}: {head_links} head links need {fewest + head_links + 4} links or more",
         )
+    raise ConfigError(
+        "robot.wheelless_links",
+        list(wheelless_links),
+        f"{condition}; here m = {m} and n - 7 = {links - 7}, so the number of wheelless links must "
+        f"be {fewest} to {most}",
+    )
 
 
 def _check_axes(links: int, head_links: int, joint_axes: Sequence[str]) -> None:
@@ -122,4 +134,24 @@ def _check_head_scps(
             field,
             given,
             "Condition 3: the head joints that are no H-SCPs must not all turn about one axis",
+        )
+    _check_neck(head_links, given, joint_axes)
+
+
+def _check_neck(head_links: int, head_scp_joints: list[int], joint_axes: Sequence[str]) -> None:
+    """Refuse heads for which Conditions 2 and 3 hold and B_tilde has no inverse all the same.
+
+    Parallel joints next to the base move it in one plane; the wheels and the floor see two
+    directions of that (v_z and one component of omega), so a third such joint adds nothing.
+    """
+    first = head_links
+    while first > 1 and joint_axes[first - 2] == "pitch":
+        first -= 1
+    used = [joint for joint in range(first, head_links + 1) if joint not in head_scp_joints]
+    if len(used) > 2:
+        raise ConfigError(
+            "robot.head_scp_joints",
+            head_scp_joints,
+            f"Condition 3 (full rank of B_tilde): of the pitch joints next to the base, {first} to "
+            f"{head_links}, all but two must be H-SCPs, or one of them a yaw joint",
         )

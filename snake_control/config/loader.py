@@ -17,7 +17,7 @@ from snake_control.config.nodes import (
 )
 from snake_control.config.parameter import Parameter, parameters
 from snake_control.config.robot import ControllerConfig, RobotConfig, ServosConfig
-from snake_control.config.yaml_file import read_sections
+from snake_control.config.yaml_file import matches, read_sections
 from snake_control.errors import ConfigError
 
 _SHARED_GROUPS: dict[str, type] = {
@@ -58,33 +58,48 @@ class Config:
     mock_bus: MockBusConfig
 
 
-def load(*paths: str | Path) -> Config:
-    """Read parameter files, later ones winning over earlier ones.
+def load(
+    *paths: str | Path, namespace: str = "/", names: Mapping[str, str] | None = None
+) -> Config:
+    """Read parameter files for one robot, later ones winning over earlier ones.
 
-    Sections with a wildcard (``/**``) may hold the shared groups ``robot``, ``servos`` and
-    ``controller`` and any node's own parameters; a section of a node holds what that node knows.
+    Sections that several kinds of nodes match (``/**``) may hold the shared groups ``robot``,
+    ``servos`` and ``controller`` and any node's own parameters; a section of one node holds what
+    that node knows. Sections of other namespaces and of foreign nodes are left alone.
+
+    Args:
+        paths: ROS parameter files.
+        namespace: the robot's namespace.
+        names: names of renamed nodes, by kind (``{"bus_driver": "left_driver"}``).
 
     Raises:
         ConfigFileError: a file that cannot be read or is no ROS parameter file.
         ConfigError: a value that is unknown, missing, of the wrong type, or not allowed.
     """
+    full_names = {
+        kind: f"{namespace.rstrip('/')}/{(names or {}).get(kind, kind)}" for kind in _NODE_GROUPS
+    }
     shared: dict[str, Any] = {}
-    own: dict[str, dict[str, Any]] = {node: {} for node in _NODE_GROUPS}
+    own: dict[str, dict[str, Any]] = {kind: {} for kind in _NODE_GROUPS}
     for path in paths:
         for pattern, values in read_sections(path):
-            nodes = _nodes_of(pattern)
-            if not nodes:
+            kinds = [kind for kind, name in full_names.items() if matches(pattern, name)]
+            if not kinds:
+                _refuse_misspelt(pattern)
                 continue
-            known = known_parameters(nodes)
+            known = known_parameters(kinds)
             for field, value in values.items():
                 if not is_ros_parameter(field):
                     refuse_unknown(field, value, known)
                 if field.partition(".")[0] in _SHARED_GROUPS:
                     shared[field] = value
-                for node in nodes:
-                    if field in known_parameters((node,)):
-                        own[node][field] = value
-    return _build(shared, own)
+                for kind in kinds:
+                    if field in known_parameters((kind,)):
+                        own[kind][field] = value
+    config = _build(shared, own)
+    config.servos.check_reach(config.robot)
+    _check_rates(config)
+    return config
 
 
 def from_parameters(node: str, values: Mapping[str, Any]) -> Config:
@@ -103,7 +118,10 @@ def from_parameters(node: str, values: Mapping[str, Any]) -> Config:
             refuse_unknown(field, value, known)
     shared = {f: v for f, v in values.items() if f.partition(".")[0] in _SHARED_GROUPS}
     own = {name: dict(values) if name == node else {} for name in _NODE_GROUPS}
-    return _build(shared, own)
+    config = _build(shared, own)
+    if "servos" in _SHARED_GROUPS_OF_NODE[node]:
+        config.servos.check_reach(config.robot)
+    return config
 
 
 def known_parameters(nodes: Iterable[str]) -> dict[str, Parameter]:
@@ -133,17 +151,58 @@ def refuse_unknown(field: str, value: object, known: Iterable[str]) -> None:
     raise ConfigError(field, value, f"unknown parameter; {hint}")
 
 
-def _nodes_of(pattern: str) -> tuple[str, ...]:
-    """Kinds of nodes a section applies to; a section of some other node applies to none."""
-    last = pattern.rpartition("/")[2]
-    if last in ("**", "*"):
-        return tuple(_NODE_GROUPS)
-    nodes = tuple(node for node in _NODE_GROUPS if last == node)
-    if not nodes:
-        near = difflib.get_close_matches(last, list(_NODE_GROUPS), n=1)
-        if near:
-            raise ConfigError(pattern, "ros__parameters", f"no such node; did you mean {near[0]}?")
-    return nodes
+def _refuse_misspelt(pattern: str) -> None:
+    """Refuse a section whose node name is one letter off one of ours; others are foreign."""
+    name = pattern.rpartition("/")[2]
+    for kind in _NODE_GROUPS:
+        if name != kind and _one_letter_apart(name, kind):
+            raise ConfigError(pattern, "ros__parameters", f"no such node; did you mean {kind}?")
+
+
+def _one_letter_apart(a: str, b: str) -> bool:
+    """Whether one letter was added, left out or changed, or two were swapped."""
+    front = 0
+    while front < min(len(a), len(b)) and a[front] == b[front]:
+        front += 1
+    rest_a, rest_b = a[front:], b[front:]
+    return (
+        rest_a[1:] == rest_b
+        or rest_a == rest_b[1:]
+        or rest_a[1:] == rest_b[1:]
+        or (rest_a[:2] == rest_b[:2][::-1] and rest_a[2:] == rest_b[2:])
+    )
+
+
+def _check_rates(config: Config) -> None:
+    """Check that every sender is quick enough for whoever waits for it, one message lost included.
+
+    Raises:
+        ConfigError: names the sender's rate or delay.
+    """
+    mock, controller = config.mock_bus, config.scp_controller
+    pairs = (
+        ("scp_controller: rate_hz", controller.rate_hz, config.bus_driver.command_timeout_s),
+        ("bus_driver: rate_hz", config.bus_driver.rate_hz, controller.joint_states_timeout_s),
+        (
+            "trajectory_generator: rate_hz",
+            config.trajectory_generator.rate_hz,
+            controller.reference_timeout_s,
+        ),
+    )
+    for field, rate_hz, timeout_s in pairs:
+        if 2.0 / rate_hz > timeout_s:
+            raise ConfigError(
+                field, rate_hz, f"at least {2.0 / timeout_s:g}: the receiver waits {timeout_s:g} s"
+            )
+    timeout_s = min(controller.head_timeout_s, config.pose_input.timeout_s)
+    latest_s = timeout_s - 2.0 / mock.mocap_rate_hz
+    if mock.mocap_delay_s > latest_s:
+        raise ConfigError(
+            "mock_bus: mocap_delay_s",
+            mock.mocap_delay_s,
+            f"at most {latest_s:.3g} at {mock.mocap_rate_hz:g} poses a second: the head pose would be "
+            f"older than {timeout_s:g} s",
+        )
 
 
 def _build(shared: Mapping[str, Any], own: Mapping[str, Mapping[str, Any]]) -> Config:

@@ -37,8 +37,8 @@ def per_joint(field: str, values: tuple[_T, ...], joints: int) -> tuple[_T, ...]
 class RobotConfig:
     """Structure and measures of the robot; defaults are the robot of the paper (Section 5)."""
 
-    links: int = parameter(12, "n, number of links", low=6, high=250)
-    head_links: int = parameter(5, "n_h, number of links of the raised head part", low=1, high=249)
+    links: int = parameter(12, "n, number of links", low=6, high=200)
+    head_links: int = parameter(5, "n_h, number of links of the raised head part", low=1, high=198)
     wheelless_links: tuple[int, ...] = parameter(
         (7, 9, 11),
         "links of the base part without wheels, counted from the head, from 1 ([0] for none)",
@@ -189,7 +189,10 @@ class ServosConfig:
         choices=("joint", "wheel"),
     )
     accepted_models: tuple[int, ...] = parameter(
-        (12, 18, 300), "model numbers accepted at start (AX-12A 12, AX-18A 18, AX-12W 300)", low=0
+        (12, 18, 300),
+        "model numbers accepted at start (AX-12A 12, AX-18A 18, AX-12W 300)",
+        low=0,
+        high=65535,
     )
     compliance_margin_ticks: tuple[int, ...] = parameter(
         (1,), "position error without output, both directions [0.293 deg]", low=0, high=254
@@ -205,6 +208,28 @@ class ServosConfig:
     torque_limit: tuple[float, ...] = parameter(
         (1.0,), "largest output [fraction of the maximum]", low=0.01, high=1.0
     )
+
+    def check_reach(self, robot: RobotConfig) -> None:
+        """Check that joint-mode servos can reach the whole range of their joints.
+
+        The controller knows a joint's range from the robot alone; a servo that ends before it
+        would stop a joint that the controller takes for free.
+
+        Raises:
+            ConfigError: a range that goes beyond the servo's +-150 degrees.
+        """
+        for joint in range(1, robot.links):
+            if self.velocity_modes[joint - 1] != "joint":
+                continue
+            for bound in robot.joint_range(joint):
+                angle = self.directions[joint - 1] * bound + self.zero_offsets_rad[joint - 1]
+                if abs(angle) > _SERVO_HALF_RANGE_RAD:
+                    raise ConfigError(
+                        "robot.joint_limits_rad",
+                        bound,
+                        f"joint {joint} would turn its servo to {angle:.3f} rad; an AX-12 in joint "
+                        f"mode reaches +-{_SERVO_HALF_RANGE_RAD:.3f}",
+                    )
 
     @staticmethod
     def for_joints(config: ServosConfig, joints: int) -> ServosConfig:

@@ -1,4 +1,4 @@
-"""Runs one node as a process: checks its files first, stops it in order on SIGINT and SIGTERM."""
+"""Runs one node as a process: checks its files first, stops it in order when it is signalled."""
 
 from __future__ import annotations
 
@@ -17,11 +17,13 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 
-from snake_control.config import load, parameter_files, parameters_of_node
+from snake_control.config import load, namespace_and_name, parameter_files, parameters_of_node
 from snake_control.errors import ConfigError, SnakeError
 
 EXIT_BAD_CONFIG = 2
 EXIT_FAILED = 1
+
+_ENDING_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 class Runnable(Protocol):
@@ -49,10 +51,12 @@ def run(make_node: Callable[..., Node], kind: str, arguments: Sequence[str] | No
     def on_signal(_number: int, _frame: FrameType | None) -> None:
         stop.set()
 
-    signal.signal(signal.SIGINT, on_signal)
-    signal.signal(signal.SIGTERM, on_signal)
+    # A closed terminal sends SIGHUP; the robot must come to rest then, too.
+    for number in _ENDING_SIGNALS:
+        signal.signal(number, on_signal)
     try:
-        load(*parameter_files(arguments))
+        namespace, name = namespace_and_name(arguments, kind)
+        load(*parameter_files(arguments), namespace=namespace, names={kind: name})
         given = parameters_of_node(arguments, kind)
     except SnakeError as error:
         print(f"configuration error: {error}", file=sys.stderr)
@@ -92,5 +96,5 @@ def run(make_node: Callable[..., Node], kind: str, arguments: Sequence[str] | No
         rclpy.try_shutdown()
         # A terminal and a launch file may both send one; while Python itself ends, a second
         # signal would turn an orderly stop into a death by signal.
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
-        signal.signal(signal.SIGTERM, signal.SIG_IGN)
+        for number in _ENDING_SIGNALS:
+            signal.signal(number, signal.SIG_IGN)

@@ -69,7 +69,37 @@ CASES = {
         "Assumption 2",
     ),
     "assumption 5": ("robot", {"wheelless_links": [6, 9]}, "wheelless_links", "Assumption 5"),
+    "pitch joints only next to the base": (
+        "robot",
+        {"joint_axes": [YAW] + [PITCH] * 4 + [YAW] * 6},
+        "head_scp_joints",
+        "all but two",
+    ),
+    "too short for its head": (
+        "robot",
+        {
+            "links": 10,
+            "head_links": 8,
+            "joint_axes": [YAW, PITCH] * 4 + [YAW],
+            "head_scp_joints": [1, 2, 3, 4],
+            "wheelless_links": [0],
+        },
+        "links",
+        "or more",
+    ),
     # Values.
+    "range beyond the servo": (
+        "robot",
+        {"joint_limits_rad": [90.0]},
+        "joint_limits_rad",
+        "joint 1",
+    ),
+    "offset turns the range away": (
+        "servos",
+        {"zero_offsets_rad": [0.0] * 3 + [1.0] + [0.0] * 7},
+        "joint_limits_rad",
+        "joint 4",
+    ),
     "head link without wheels": ("robot", {"wheelless_links": [3]}, "wheelless_links", "link 3"),
     "same link twice": ("robot", {"wheelless_links": [7, 7]}, "wheelless_links", "once"),
     "too few axes": ("robot", {"joint_axes": [PITCH, YAW]}, "joint_axes", "11"),
@@ -113,9 +143,7 @@ def test_field_is_named(tmp_path, case):
     group, values, field, message = case
     with pytest.raises(ConfigError) as caught:
         load(PAPER_YAML, with_shared(tmp_path, group, **values))
-    assert caught.value.field == f"{group}.{field}" or caught.value.field.startswith(
-        f"{group}.{field}["
-    )
+    assert caught.value.field.partition(".")[2].partition("[")[0] == field.partition("[")[0]
     assert message in str(caught.value)
     assert str(caught.value).startswith(f"{caught.value.field} = ")
 
@@ -128,6 +156,21 @@ NODE_CASES = {
     "negative noise": ("mock_bus", "mocap_position_noise_m: -1.0", "mocap_position_noise_m", "0"),
     "no bandwidth": ("pose_input", "cutoff_hz: 0.0", "cutoff_hz", "0.1"),
     "unknown trajectory": ("trajectory_generator", "trajectory: loop", "trajectory", "line"),
+    "commands too rare": ("scp_controller", "rate_hz: 5.0", "scp_controller: rate_hz", "20"),
+    "bus too slow": (
+        "bus_driver",
+        "{rate_hz: 15.0, look_ahead_s: 0.5}",
+        "bus_driver: rate_hz",
+        "20",
+    ),
+    "references too rare": (
+        "trajectory_generator",
+        "rate_hz: 5.0",
+        "trajectory_generator: rate_hz",
+        "10",
+    ),
+    "mocap too late": ("mock_bus", "mocap_delay_s: 0.1", "mock_bus: mocap_delay_s", "0.08"),
+    "seed beyond an integer": ("mock_bus", "seed: 3000000000", "seed", "2.14748e+09"),
     "empty": ("scp_controller", "rate_hz:", "rate_hz", "value"),
 }
 
@@ -135,7 +178,7 @@ NODE_CASES = {
 @pytest.mark.parametrize("case", NODE_CASES.values(), ids=NODE_CASES)
 def test_field_of_a_node_is_named(tmp_path, case):
     node, line, field, message = case
-    text = f"/**/{node}:\n  ros__parameters:\n    {line}\n"
+    text = f"/**/{node}:\n  ros__parameters: {line if line[0] == '{' else '{' + line + '}'}\n"
     with pytest.raises(ConfigError) as caught:
         load(PAPER_YAML, broken(tmp_path, text))
     assert caught.value.field == field

@@ -91,7 +91,24 @@ def test_empty_file_changes_nothing(tmp_path):
 def test_misspelt_node_is_refused_and_foreign_nodes_are_ignored(tmp_path):
     with pytest.raises(ConfigError, match="bus_driver"):
         load(write(tmp_path, "bus_drver: {ros__parameters: {port: /dev/null}}"))
-    assert load(write(tmp_path, "twist_mux: {ros__parameters: {a: 1}}")) == load()
+    with pytest.raises(ConfigError, match="bus_driver"):
+        load(write(tmp_path, "/**/bus_dirver: {ros__parameters: {port: /dev/null}}"))
+    for foreign in ("twist_mux", "/**/mocap_bus", "/bus_driver_left"):
+        assert load(write(tmp_path, f"{foreign}: {{ros__parameters: {{a: 1}}}}")) == load()
+
+
+def test_two_robots_in_one_file(tmp_path):
+    path = write(
+        tmp_path,
+        "/one/**: {ros__parameters: {robot: {half_length_m: 0.05}}}\n"
+        "/two/**: {ros__parameters: {robot: {half_length_m: 0.06}}}\n"
+        "/two/driver: {ros__parameters: {port: /dev/two}}\n",
+    )
+    assert load(path).robot.half_length_m == 0.034
+    assert load(path, namespace="/one").robot.half_length_m == 0.05
+    two = load(path, namespace="/two", names={"bus_driver": "driver"})
+    assert two.robot.half_length_m == 0.06
+    assert two.bus_driver.port == "/dev/two"
 
 
 @pytest.mark.parametrize(
