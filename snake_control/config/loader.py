@@ -200,7 +200,7 @@ def _check_rates(config: Config) -> None:
         raise ConfigError(
             "mock_bus: mocap_delay_s",
             mock.mocap_delay_s,
-            f"at most {latest_s:.3g} at {mock.mocap_rate_hz:g} poses a second: the head pose would be "
+            f"at most {latest_s:.3g} at {mock.mocap_rate_hz:g} poses a second: head poses would be "
             f"older than {timeout_s:g} s",
         )
 

@@ -164,7 +164,7 @@ class MockBusConfig:
     port: str = parameter(
         "/tmp/snake_control_mock_bus", "symbolic link to the serial port that the mock opens"
     )
-    seed: int = parameter(0, "seed of all random numbers", low=0)
+    seed: int = parameter(0, "seed of all random numbers", low=0, high=2**31 - 1)
     baud_rate: int = parameter(
         1000000, "rate that every servo listens at [bit/s]", choices=SDK_BAUD_RATES
     )

@@ -178,7 +178,8 @@ NODE_CASES = {
 @pytest.mark.parametrize("case", NODE_CASES.values(), ids=NODE_CASES)
 def test_field_of_a_node_is_named(tmp_path, case):
     node, line, field, message = case
-    text = f"/**/{node}:\n  ros__parameters: {line if line[0] == '{' else '{' + line + '}'}\n"
+    values = line if line.startswith("{") else "{" + line + "}"
+    text = f"/**/{node}: {{ros__parameters: {values}}}\n"
     with pytest.raises(ConfigError) as caught:
         load(PAPER_YAML, broken(tmp_path, text))
     assert caught.value.field == field
