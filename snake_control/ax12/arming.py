@@ -29,17 +29,19 @@ class Seed:
     Attributes:
         goal_ticks: goal written; 0 in wheel mode, where none is.
         angle: the same as servo angle [rad].
+        had_torque: whether it was held before.
     """
 
     goal_ticks: int
     angle: float
+    had_torque: bool
 
 
 def arm(bus: Bus, joints: Sequence[JointSetup], servos: Sequence[ServoInfo]) -> tuple[Seed, ...]:
     """Seed every goal from the present position, write the RAM settings, switch torque on.
 
     Torque goes on only when all servos took their settings; if one refuses torque, it is taken
-    from all again.
+    again from those that it was given to here. A servo that held before goes on holding.
 
     Raises:
         ServoError: all findings; no torque was switched on, or it is off again.
@@ -65,7 +67,9 @@ def _arm(bus: Bus, joints: Sequence[JointSetup], servos: Sequence[ServoInfo]) ->
         except ServoError as error:
             findings.extend(f"{joint}: no torque: {text}" for text in error.findings)
     if findings:
-        disarm(bus, joints)
+        fresh = [joint for joint, seed in zip(joints, seeds, strict=True) if not seed.had_torque]
+        if fresh:
+            disarm(bus, fresh)
         raise ServoError(findings)
     return tuple(seeds)
 
@@ -82,28 +86,47 @@ def disarm(bus: Bus, joints: Sequence[JointSetup]) -> None:
         bus.sync_write(ct.TORQUE_ENABLE.address, {joint.servo_id: b"\x00" for joint in joints})
 
 
-def check_armed(bus: Bus, joint: JointSetup, servo: ServoInfo) -> str:
-    """Return what is wrong with an armed servo's RAM, empty if nothing or if it did not answer.
+def read_torque(bus: Bus, joint: JointSetup, retries: int | None = None) -> bool | None:
+    """Return whether Torque Enable is set; ``None`` if the servo did not answer."""
+    # One byte is never read alone: an error status without data could pass for it.
+    reply = bus.read(joint.servo_id, _RAM, 2, retries)
+    return None if reply is None else ct.TORQUE_ENABLE.decode(reply.data, _RAM) != 0
+
+
+def check_armed(bus: Bus, joint: JointSetup) -> tuple[bool | None, str]:
+    """Return Torque Enable as in ``read_torque``, and what is wrong with an armed servo's RAM.
 
     A servo that lost power for a moment answers as before but has lost torque and settings; after
     an alarm its torque limit is 0.
     """
     reply = bus.read(joint.servo_id, _RAM, _WATCHED, retries=0)
     if reply is None:
-        return ""
+        return None, ""
+    torque = ct.TORQUE_ENABLE.decode(reply.data, _RAM) != 0
+    wrong = ""
     if ct.TORQUE_LIMIT.decode(reply.data, _RAM) == 0:
-        return "torque limit is 0: it switched itself off after an alarm"
-    if ct.TORQUE_ENABLE.decode(reply.data, _RAM) == 0:
-        return "torque is off: an alarm, or its power failed for a moment"
-    if reply.data[2:6] != _compliance(joint):
-        return "its settings are gone: did its power fail for a moment?"
-    return ""
+        wrong = "torque limit is 0: it switched itself off after an alarm"
+    elif not torque:
+        wrong = "torque is off: an alarm, or its power failed for a moment"
+    elif reply.data[2:6] != _compliance(joint):
+        wrong = "its settings are gone: did its power fail for a moment?"
+    return torque, wrong
 
 
 def _seed(bus: Bus, joint: JointSetup, servo: ServoInfo) -> Seed:
     before = bus.read(joint.servo_id, _RAM, _RAM_LENGTH)
     if before is None:
         raise ServoError(["does not answer"])
+    enabled = ct.TORQUE_ENABLE.decode(before.data, _RAM) != 0
+    # After an alarm Torque Enable may still be set, while the joint is limp.
+    limp = (
+        ct.TORQUE_LIMIT.decode(before.data, _RAM) == 0
+        or before.error_bits & servo.shutdown_bits != 0
+    )
+    if enabled and limp:
+        # Else its torque would return with the torque limit, before the others are ready.
+        bus.write_verified(joint.servo_id, ct.TORQUE_ENABLE.address, b"\x00")
+    held = enabled and not limp
     torque_limit = min(joint.torque_limit_raw, servo.max_torque_raw)
     if joint.mode == WHEEL_MODE:
         goal = 0
@@ -111,24 +134,23 @@ def _seed(bus: Bus, joint: JointSetup, servo: ServoInfo) -> Seed:
         address = ct.MOVING_SPEED.address
         bus.write_verified(joint.servo_id, ct.CW_COMPLIANCE_MARGIN.address, _compliance(joint))
     else:
-        goal = _goal_to_hold(joint, servo, before.data)
+        goal = _goal_to_hold(joint, servo, before.data, held)
         motion = _compliance(joint) + ct.GOAL_POSITION.encode(goal)
         motion += ct.MOVING_SPEED.encode(SEED_SPEED_RAW) + ct.TORQUE_LIMIT.encode(torque_limit)
         address = ct.CW_COMPLIANCE_MARGIN.address
     # One packet: the goal must not be in force with a speed or a compliance not meant for it.
     bus.write_verified(joint.servo_id, address, motion)
     bus.write_verified(joint.servo_id, ct.PUNCH.address, ct.PUNCH.encode(joint.punch_raw))
-    return Seed(goal, ticks_to_rad(goal) if joint.mode != WHEEL_MODE else 0.0)
+    return Seed(goal, ticks_to_rad(goal) if joint.mode != WHEEL_MODE else 0.0, held)
 
 
-def _goal_to_hold(joint: JointSetup, servo: ServoInfo, ram: bytes) -> int:
+def _goal_to_hold(joint: JointSetup, servo: ServoInfo, ram: bytes, held: bool) -> int:
     position = ct.PRESENT_POSITION.decode(ram, _RAM)
     if position > MAX_TICKS:
         raise ServoError([f"reports position {position}, which does not exist"])
     goal = ct.GOAL_POSITION.decode(ram, _RAM)
     at_rest = decode_signed(ct.PRESENT_SPEED.decode(ram, _RAM)) == 0
-    held = ct.TORQUE_ENABLE.decode(ram, _RAM) and at_rest
-    if held and abs(goal - position) <= joint.compliance_ticks:
+    if held and at_rest and abs(goal - position) <= joint.compliance_ticks:
         # It holds already, a droop away from its goal; goal = position would let it sag once more.
         position = goal
     if not servo.goal_allowed(position):

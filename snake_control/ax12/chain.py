@@ -12,12 +12,12 @@ import math
 from collections.abc import Callable, Sequence
 
 from snake_control.ax12 import control_table as ct
-from snake_control.ax12.arming import arm, check_armed, disarm
+from snake_control.ax12.arming import arm, check_armed, disarm, read_torque
 from snake_control.ax12.bus import Bus, Counters
-from snake_control.ax12.feedback import Feedback, wheel_speed_unit
+from snake_control.ax12.feedback import Feedback
 from snake_control.ax12.joint import WHEEL_MODE, JointSetup
 from snake_control.ax12.startup import ServoInfo
-from snake_control.ax12.units import WHEEL_NO_LOAD_RAD_S, error_names
+from snake_control.ax12.units import JOINT_NO_LOAD_RAD_S, WHEEL_NO_LOAD_RAD_S, error_names
 from snake_control.ax12.velocity import (
     GoalAndSpeed,
     JointModeVelocity,
@@ -25,9 +25,15 @@ from snake_control.ax12.velocity import (
     VelocityLimits,
     WheelModeVelocity,
 )
+from snake_control.errors import ServoError
 
 _CHECK_EVERY_CYCLES = 5
 _ALARMS_IN_ROW = 2
+
+FEEDBACK_LOST_S = 0.5
+"""Without a believable reading of a driven joint for so long the robot must stop."""
+
+_ASKED_IN_VAIN = 2
 
 
 @dataclasses.dataclass(frozen=True)
@@ -57,6 +63,7 @@ class JointReading:
         age: of the reading [s], infinite before the first.
         error_bits: of the last reply.
         online: False once the servo counts as lost.
+        torque_on: Torque Enable as last read or acknowledged.
         counters: what became of the reads so far.
         invalid_values: replies that were not believed.
     """
@@ -70,6 +77,7 @@ class JointReading:
     age: float
     error_bits: int
     online: bool
+    torque_on: bool
     counters: Counters
     invalid_values: int
 
@@ -86,15 +94,20 @@ class _Servo:
             period=motion.period,
             look_ahead=motion.look_ahead,
             compliance_ticks=joint.compliance_ticks,
+            goal_ticks=info.angle_limits_ticks,
         )
+        self.wheel = joint.mode == WHEEL_MODE
+        fastest = WHEEL_NO_LOAD_RAD_S if self.wheel else JOINT_NO_LOAD_RAD_S
+        no_load = fastest.get(info.model, fastest[12])
         self.control: JointModeVelocity | WheelModeVelocity
-        if joint.mode == WHEEL_MODE:
-            no_load = WHEEL_NO_LOAD_RAD_S.get(info.model, WHEEL_NO_LOAD_RAD_S[12])
+        if self.wheel:
             self.control = WheelModeVelocity(limits, no_load)
-            self.feedback = Feedback(wheel_speed_unit(no_load), max_rate=1.2 * no_load)
         else:
             self.control = JointModeVelocity(limits)
-            self.feedback = Feedback()
+        self.feedback = Feedback(no_load, self.wheel)
+        self.torque_on = False
+        self.heard_at = -math.inf  # last reply to go by
+        self.asked_in_vain = 0
         self.alarms_in_row = 0
         self.sent = GoalAndSpeed(None, 0)
 
@@ -132,8 +145,16 @@ class ServoChain:
 
     @property
     def armed(self) -> bool:
-        """Whether torque was switched on (and acknowledged) and not off again."""
+        """Whether the last ``arm`` succeeded and torque was not taken since: goals may be sent.
+
+        It says nothing about servos that nobody armed here; ``torque_on`` does.
+        """
         return self._armed
+
+    @property
+    def torque_on(self) -> tuple[JointSetup, ...]:
+        """Joints with torque, as last read from the servos."""
+        return tuple(servo.joint for servo in self._servos if servo.torque_on)
 
     @property
     def joints(self) -> tuple[JointSetup, ...]:
@@ -144,23 +165,49 @@ class ServoChain:
         """Switch torque on where the joints are.
 
         Raises:
-            ServoError: a servo refused; torque is off.
+            ServoError: a servo refused; no torque was switched on, but servos that had it hold, now
+                by themselves.
             BusError: the port failed (so do all methods).
         """
+        # Until all are seeded anew, what was sent before is no place to return to.
         self._armed = False
-        seeds = arm(self._bus, self.joints, [servo.info for servo in self._servos])
+        try:
+            seeds = arm(self._bus, self.joints, [servo.info for servo in self._servos])
+        except ServoError:
+            self.look_for_torque()
+            raise
         self._armed = True
         self._finding = ""
+        self._written_at = self._clock()
         for servo, seed in zip(self._servos, seeds, strict=True):
             servo.sent = servo.control.latch(seed.angle)
-            servo.alarms_in_row = 0
+            servo.torque_on = True
+            servo.heard_at = self._written_at
+            servo.asked_in_vain = servo.alarms_in_row = 0
             servo.feedback.forget()
-        self._written_at = self._clock()
 
     def disarm(self) -> None:
-        """Switch torque off: the joints are free."""
-        self._armed = False
+        """Switch torque off: the joints are free.
+
+        Raises:
+            ServoError: it was sent to all, but some servos did not confirm it.
+        """
         disarm(self._bus, self.joints)
+        self._armed = False
+        unsure = self.look_for_torque()
+        if unsure:
+            raise ServoError([f"{joint}: torque off is not confirmed" for joint in unsure])
+
+    def look_for_torque(self) -> tuple[JointSetup, ...]:
+        """Read Torque Enable of all servos; return the joints with torque, or without answer."""
+        unsure = []
+        for servo in self._servos:
+            found = read_torque(self._bus, servo.joint)
+            if found is not None:
+                servo.torque_on = found
+            if found is None or found:
+                unsure.append(servo.joint)
+        return tuple(unsure)
 
     def write(self, velocities: Sequence[float] | None) -> None:
         """Send one cycle's goals and speeds.
@@ -209,13 +256,15 @@ class ServoChain:
                 break
             missed = self._read_one(self._servos[index], until)
         self._cycles += 1
-        if self._armed and self._cycles % _CHECK_EVERY_CYCLES == 0 and self._clock() < until:
+        if self._cycles % _CHECK_EVERY_CYCLES == 0 and self._clock() < until:
             self._check_next = (self._check_next + 1) % count
             servo = self._servos[self._check_next]
             if not self._is_lost(servo):
-                found = check_armed(self._bus, servo.joint, servo.info)
-                if found:
-                    self._finding = f"{servo.joint}: {found}"
+                torque, wrong = check_armed(self._bus, servo.joint)
+                if torque is not None:
+                    servo.torque_on = torque
+                if wrong and self._armed:
+                    self._finding = f"{servo.joint}: {wrong}"
 
     def readings(self) -> list[JointReading]:
         """Return every joint as last seen."""
@@ -236,6 +285,17 @@ class ServoChain:
                 + ", ".join(error_names(s.feedback.error_bits & s.info.shutdown_bits))
                 for s in alarmed
             )
+        now = self._clock()
+        # Asked in vain: while this process did not run, nobody could answer.
+        unheard = [
+            servo.joint
+            for servo in self._servos
+            if now - servo.heard_at > FEEDBACK_LOST_S and servo.asked_in_vain >= _ASKED_IN_VAIN
+        ]
+        if unheard:
+            return f"no believable reading for {FEEDBACK_LOST_S:g} s from " + ", ".join(
+                map(str, unheard)
+            )
         return self._finding
 
     def _read_one(self, servo: _Servo, until: float) -> int:
@@ -248,9 +308,15 @@ class ServoChain:
         # A servo that missed before gets one try: time for retries belongs to the others.
         retries = None if (counters is None or not counters.misses_in_row) and begin < until else 0
         reply = self._bus.read(servo_id, *ct.FEEDBACK_BLOCK, retries)
+        servo.asked_in_vain += 1
         if reply is None:
             return self._bus.counters[servo_id].misses_in_row
-        servo.feedback.take(reply.data, reply.error_bits, 0.5 * (begin + self._clock()))
+        now = 0.5 * (begin + self._clock())
+        believed = servo.feedback.take(reply.data, reply.error_bits, now)
+        # A wheel does not move by its readings, and has none in the dead zone of its sensor.
+        if believed or servo.wheel:
+            servo.heard_at = now
+            servo.asked_in_vain = 0
         alarmed = reply.error_bits & servo.info.shutdown_bits
         servo.alarms_in_row = servo.alarms_in_row + 1 if alarmed else 0
         return 0
@@ -272,6 +338,7 @@ class ServoChain:
             age=now - feedback.read_at,
             error_bits=feedback.error_bits,
             online=not self._is_lost(servo),
+            torque_on=servo.torque_on,
             counters=dataclasses.replace(counters),
             invalid_values=feedback.invalid_values,
         )

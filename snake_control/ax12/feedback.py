@@ -6,19 +6,19 @@ import math
 
 from snake_control.ax12 import control_table as ct
 from snake_control.ax12.units import (
+    JOINT_NO_LOAD_RAD_S,
     MAX_RAW,
     MAX_SIGNED_RAW,
     MAX_TICKS,
     RAD_PER_TICK,
+    RAD_S_PER_SPEED_UNIT,
     decode_signed,
     load_to_fraction,
     raw_to_volt,
-    speed_to_rad_s,
     ticks_to_rad,
 )
 
-MAX_RATE_RAD_S = 7.0
-"""No AX-12 turns faster (6.2 rad/s without load at 12 V): a faster change is a misreading."""
+_MAX_SHARE = 1.15
 
 _SLACK_TICKS = 4
 
@@ -28,7 +28,8 @@ class Feedback:
 
     Attributes:
         angle: servo angle [rad]; NaN before the first good reply.
-        rate: its velocity [rad/s] as the servo reports it, positive counter-clockwise.
+        rate: its velocity [rad/s] as the servo reports it, positive counter-clockwise; no larger
+            than the servo can turn.
         load: fraction of the maximum output, inferred by the servo from its own output.
         voltage: [V].
         temperature: [degC].
@@ -37,15 +38,16 @@ class Feedback:
         invalid_values: how many replies were not believed.
     """
 
-    def __init__(self, wheel_speed_unit: float | None = None, max_rate: float = MAX_RATE_RAD_S):
+    def __init__(self, no_load_speed: float = JOINT_NO_LOAD_RAD_S[12], wheel: bool = False) -> None:
         """Start without any reply.
 
         Args:
-            wheel_speed_unit: rad/s for each unit of Present Speed in wheel mode; None: joint mode.
-            max_rate: largest believable change of angle [rad/s].
+            no_load_speed: of the servo [rad/s]; a faster change is a misreading.
+            wheel: whether it is in wheel mode, where units of Present Speed are shares of the
+                speed without load (e-manual).
         """
-        self._wheel_speed_unit = wheel_speed_unit
-        self._max_rate = max_rate
+        self._speed_unit = no_load_speed / MAX_RAW if wheel else RAD_S_PER_SPEED_UNIT
+        self._max_rate = _MAX_SHARE * no_load_speed
         self.angle = math.nan
         self.rate = math.nan
         self.load = math.nan
@@ -62,9 +64,9 @@ class Feedback:
     def take(self, block: bytes, error_bits: int, now: float) -> bool:
         """Take the 8 bytes from Present Position on; return whether they were believed.
 
-        Position and speed are refused together when one is out of its range or when the position
-        changed faster than a servo can turn: readings in the dead zone of a wheel-mode servo
-        (300 to 360 degrees) are of this kind.
+        Position and speed are refused together when one is out of its range, when the speed is
+        more than the servo can turn, or when the position changed faster: readings in the dead
+        zone of a wheel-mode servo (300 to 360 degrees) are of this kind.
         """
         self.error_bits = error_bits
         at = ct.PRESENT_POSITION.address
@@ -74,22 +76,16 @@ class Feedback:
             self.invalid_values += 1
             return False
         angle = ticks_to_rad(position)
+        rate = decode_signed(speed) * self._speed_unit
         reach = self._max_rate * (now - self.read_at) + _SLACK_TICKS * RAD_PER_TICK
-        if abs(angle - self.angle) > reach:  # false while the angle is NaN
+        # The second is false while the angle is NaN.
+        if abs(rate) > self._max_rate or abs(angle - self.angle) > reach:
             self.invalid_values += 1
             return False
         self.angle = angle
-        if self._wheel_speed_unit is None:
-            self.rate = speed_to_rad_s(speed)
-        else:
-            self.rate = decode_signed(speed) * self._wheel_speed_unit
+        self.rate = rate
         self.load = load_to_fraction(ct.PRESENT_LOAD.decode(block, at))
         self.voltage = raw_to_volt(ct.PRESENT_VOLTAGE.decode(block, at))
         self.temperature = float(ct.PRESENT_TEMPERATURE.decode(block, at))
         self.read_at = now
         return True
-
-
-def wheel_speed_unit(no_load_speed: float) -> float:
-    """Return rad/s for each unit of speed in wheel mode, where units are output (e-manual)."""
-    return no_load_speed / MAX_RAW

@@ -26,6 +26,9 @@ _RPM = 2.0 * math.pi / 60.0
 WHEEL_NO_LOAD_RAD_S = {12: 59.0 * _RPM, 18: 97.0 * _RPM, 300: 470.0 * _RPM}
 """Speed without load at full output by model number; wheel mode commands output, not speed."""
 
+JOINT_NO_LOAD_RAD_S = WHEEL_NO_LOAD_RAD_S | {300: 54.0 * _RPM}
+"""The same in joint mode."""
+
 ERROR_NAMES: tuple[str, ...] = (
     "input voltage",
     "angle limit",
@@ -68,11 +71,6 @@ def encode_signed(value: int) -> int:
     if abs(value) > MAX_RAW:
         raise ValueError(f"magnitude above {MAX_RAW}: {value}")
     return SIGN_BIT - value if value < 0 else value
-
-
-def speed_to_rad_s(raw: int) -> float:
-    """Return Present Speed in rad/s, positive counter-clockwise."""
-    return decode_signed(raw) * RAD_S_PER_SPEED_UNIT
 
 
 def load_to_fraction(raw: int) -> float:

@@ -14,6 +14,10 @@ and holds it. Per servo there is a setpoint x_s, an angle:
   droop away from x_s, where compliance balances gravity; because x_s is not latched anew from the
   joint, a chain of hold cycles does not creep down.
 * x_s stays within margin + slope of the joint: no long catching up after a joint was blocked.
+* A joint whose reading is older than 0.1 s (and 2.5 cycles) holds: goals that run ahead of x_s
+  alone would let it run without bound.
+* After 0.3 s of rest the speed of the hold falls to that of activation, so that a joint pushed away
+  by hand does not snap back.
 * A stop must be short, but must not give the droop away. While the joint rests or creeps (below
   one unit), the droop x_s - joint is remembered (low pass). At fast motion (from four units) and
   at the edge to rest, x_s is limited to the joint's extrapolated place + [0 .. droop], widened by
@@ -50,7 +54,8 @@ SEED_SPEED_RAW = 20
 
 _FAST_UNITS = 4.0
 _DROOP_TIME_S = 0.3
-_STALE_S = 0.1
+_REST_TIME_S = 0.3
+_STALE_S, _STALE_PERIODS = 0.1, 2.5
 _BAND_TICKS = 2.0
 
 
@@ -61,10 +66,9 @@ class Present(NamedTuple):
     rate: float
     age: float
 
-    @property
-    def now(self) -> float:
-        """The angle extrapolated to the present time; for a limited time only."""
-        return self.angle + self.rate * min(self.age, _STALE_S)
+    def after(self, longest: float, fastest: float) -> float:
+        """The angle extrapolated to the present time, by a limited time and speed only."""
+        return self.angle + min(max(self.rate, -fastest), fastest) * min(self.age, longest)
 
 
 class GoalAndSpeed(NamedTuple):
@@ -85,6 +89,8 @@ class VelocityLimits:
         period: nominal time between two cycles [s].
         look_ahead: how far the goal is ahead of the joint, as time at its speed [s].
         compliance_ticks: margin + slope, in which the servo does not move at its speed.
+        goal_ticks: first and last goal that the servo accepts; it refuses others, and goes on to
+            the goal it had (joint mode).
     """
 
     lower_ticks: int
@@ -94,6 +100,7 @@ class VelocityLimits:
     period: float
     look_ahead: float
     compliance_ticks: int
+    goal_ticks: tuple[int, int] = (0, MAX_TICKS)
 
 
 class _SigmaDelta:
@@ -163,6 +170,9 @@ class JointModeVelocity:
         self._velocity = 0.0
         self._speed_raw = SEED_SPEED_RAW
         self._droop = 0.0
+        self._at_rest = 0.0  # [s]
+        # At a low rate of the bus the newest reading is a period old.
+        self._oldest = max(_STALE_S, _STALE_PERIODS * limits.period)
 
     def latch(self, angle: float) -> GoalAndSpeed:
         """Start holding ``angle`` [rad] at the low speed of activation."""
@@ -190,24 +200,29 @@ class JointModeVelocity:
         dt = min(max(dt, 0.0), limits.look_ahead)
         self._advance(self._units.elapse(dt))
         velocity = self._ramp.step(velocity, dt)
+        stale = not present.age <= self._oldest
+        if stale:
+            velocity = self._ramp.velocity = 0.0
         at_end = self._is_outwards(velocity, present)
         if at_end:
             # x_s stays at the end: pulled back to the joint, it would set off again at once.
             velocity = self._ramp.velocity = 0.0
-        elif present.age <= _STALE_S:
-            self._limit_lead(velocity, dt, present)
+        else:
+            self._limit_lead(velocity, dt, present, stale)
         self._velocity = velocity
+        self._at_rest = self._at_rest + dt if velocity == 0.0 else 0.0
         units = self._units.next(velocity)
         if units == 0:
+            if self._at_rest > _REST_TIME_S:
+                self._speed_raw = min(self._speed_raw, SEED_SPEED_RAW)
             return self._hold()
         self._speed_raw = abs(units)
-        origin = present.angle if present.age <= _STALE_S else self.setpoint
         ahead = (
             self._compliance
             + RAD_PER_TICK
             + max(abs(velocity), self._speed_raw * RAD_S_PER_SPEED_UNIT) * limits.look_ahead
         )
-        return self._send(origin + math.copysign(ahead, velocity))
+        return self._send(present.angle + math.copysign(ahead, velocity))
 
     def _advance(self, way: float) -> None:
         # A joint that was turned out of its range by hand is held there, and only let inwards.
@@ -221,11 +236,12 @@ class JointModeVelocity:
             velocity < 0 and min(self.setpoint, present.angle) <= self._lower
         )
 
-    def _limit_lead(self, velocity: float, dt: float, present: Present) -> None:
-        here = present.now
+    def _limit_lead(self, velocity: float, dt: float, present: Present, stale: bool) -> None:
+        here = present.after(self._oldest, abs(self._velocity) + RAD_S_PER_SPEED_UNIT)
         lead = self.setpoint - here
         speed = abs(velocity)
-        if speed < RAD_S_PER_SPEED_UNIT and abs(self._velocity) < RAD_S_PER_SPEED_UNIT:
+        slow = max(speed, abs(self._velocity)) < RAD_S_PER_SPEED_UNIT
+        if slow and not stale:
             self._droop += (lead - self._droop) * min(1.0, dt / _DROOP_TIME_S)
             self._droop = min(max(self._droop, -self._compliance), self._compliance)
         stopping = velocity == 0.0 and self._velocity != 0.0
@@ -245,7 +261,8 @@ class JointModeVelocity:
     def _send(self, goal: float) -> GoalAndSpeed:
         low = min(self._limits.lower_ticks, math.floor(rad_to_ticks(self.setpoint)))
         high = max(self._limits.upper_ticks, math.ceil(rad_to_ticks(self.setpoint)))
-        ticks = min(max(round(rad_to_ticks(goal)), low, 0), high, MAX_TICKS)
+        first, last = self._limits.goal_ticks
+        ticks = min(max(round(rad_to_ticks(goal)), low, first), high, last)
         return GoalAndSpeed(ticks, self._speed_raw)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import time
 from collections.abc import Iterator
@@ -16,7 +17,7 @@ from snake_control.ax12.joint import JointSetup
 from snake_control.ax12.port import SerialPort
 from snake_control.ax12.startup import handshake
 from snake_control.ax12.units import RAD_PER_TICK, RAD_S_PER_SPEED_UNIT, ticks_to_rad
-from snake_control.errors import BusError
+from snake_control.errors import BusError, ServoError
 from support.scripted_servos import READ, SYNC_WRITE, ScriptedServos, packet
 
 MOTION = Motion(period=0.02, look_ahead=0.15, acceleration=0.0, lost_after_misses=3)
@@ -128,6 +129,74 @@ def test_dead_servos_cannot_keep_a_cycle_from_ending(
     assert [asked() for _ in range(5)] == [[1], [1], [2], [3], [1]]
 
 
+def move(chain: ServoChain, seconds: float) -> str:
+    """Cycle with a velocity until there is a fault."""
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        chain.write([0.5, 0.5, 0.0])
+        read(chain, 0.015)
+        if fault := chain.fault():
+            return fault
+    return ""
+
+
+def test_replies_that_nobody_believes_stop_the_robot(
+    chain: ServoChain, servos: ScriptedServos
+) -> None:
+    chain.arm()
+    servos.memory[1][36:38] = (2047).to_bytes(2, "little")
+    begin = time.monotonic()
+    assert move(chain, 20.0) == "no believable reading for 0.5 s from joint_1 (servo id 1)"
+    assert time.monotonic() - begin >= 0.5
+    goal = int.from_bytes(servos.memory[1][30:32], "little")
+    assert abs(goal - 512) <= 4, "it was never seen to move"
+
+
+def test_a_silent_bus_stops_the_robot_long_before_every_servo_is_lost(
+    servos: ScriptedServos,
+) -> None:
+    bus = Bus(SerialPort(servos.path, 1000000, reply_timeout_s=0.005), retries=1)
+    patient = dataclasses.replace(MOTION, lost_after_misses=1000)
+    info = handshake(bus, JOINTS, (12,)).servos
+    chain = ServoChain(bus, JOINTS, info, patient, time.monotonic)
+    chain.arm()
+    servos.answer = lambda _, answer: b""
+    assert move(chain, 20.0).startswith("no believable reading for 0.5 s from joint_")
+    bus.close()
+
+
+def test_a_pause_of_this_process_is_no_fault(servos: ScriptedServos) -> None:
+    now = 100.0
+    bus = Bus(SerialPort(servos.path, 1000000, reply_timeout_s=0.02), retries=1)
+    chain = ServoChain(bus, JOINTS, handshake(bus, JOINTS, (12,)).servos, MOTION, lambda: now)
+    chain.arm()
+    chain.read(now + 1.0)
+    now += 5.0
+    assert chain.fault() == ""
+    bus.close()
+
+
+def test_torque_off_is_verified(chain: ServoChain, servos: ScriptedServos) -> None:
+    chain.arm()
+    assert [joint.servo_id for joint in chain.torque_on] == [1, 2, 3]
+    servos.answer = lambda i, answer: b"" if i[2] == 2 else answer
+    with pytest.raises(ServoError) as caught:
+        chain.disarm()
+    assert caught.value.findings == ["joint_2 (servo id 2): torque off is not confirmed"]
+    assert not chain.armed
+    assert [reading.torque_on for reading in chain.readings()] == [False, True, False]
+    servos.answer = None
+    chain.disarm()
+    assert chain.torque_on == ()
+
+
+def test_torque_that_is_on_already_is_seen(chain: ServoChain, servos: ScriptedServos) -> None:
+    servos.memory[2][24] = 1
+    assert [joint.servo_id for joint in chain.look_for_torque()] == [2]
+    assert [joint.servo_id for joint in chain.torque_on] == [2]
+    assert not chain.armed
+
+
 def test_an_alarm_that_switches_torque_off_is_a_fault(
     chain: ServoChain, servos: ScriptedServos
 ) -> None:
@@ -161,7 +230,9 @@ def test_an_unplugged_port_is_a_bus_error(chain: ServoChain, servos: ScriptedSer
 
 
 @pytest.mark.parametrize(
-    ("position", "speed"), [(1024, 0), (600, 3154), (700, 0)], ids=["range", "speed", "jump"]
+    ("position", "speed"),
+    [(1024, 0), (600, 3154), (512, 1023), (512, 2047), (700, 0)],
+    ids=["range", "speed", "fast", "fast back", "jump"],
 )
 def test_an_unbelievable_reply_is_not_taken(position: int, speed: int) -> None:
     feedback = Feedback()

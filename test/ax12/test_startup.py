@@ -190,6 +190,23 @@ def test_a_servo_that_holds_already_keeps_its_goal(bus: Bus, servos: ScriptedSer
     assert armed(bus) == (520, 512, 512)
 
 
+@pytest.mark.parametrize("sign", ["torque limit", "error bit"])
+def test_a_joint_that_went_limp_is_not_lifted_to_its_old_goal(
+    bus: Bus, servos: ScriptedServos, sign: str
+) -> None:
+    servos.memory[1][24] = 1
+    servos.memory[1][30:32] = (520).to_bytes(2, "little")
+    if sign == "torque limit":
+        servos.memory[1][34:36] = bytes(2)
+    else:
+        servos.error_bits[1] = 32
+    assert armed(bus) == (512, 512, 512)
+    # Torque comes back with that of the others, not with the torque limit.
+    first = servos.instructions(WRITE)[0]
+    assert (first[2], first[5], first[6]) == (1, 24, 0)
+    assert servos.memory[1][24] == 1
+
+
 def test_a_servo_outside_its_angle_limits_is_not_armed(bus: Bus, servos: ScriptedServos) -> None:
     servos.memory[2][6:10] = bytes((*(300).to_bytes(2, "little"), *(800).to_bytes(2, "little")))
     stand_at(servos, 2, 900)
@@ -198,7 +215,7 @@ def test_a_servo_outside_its_angle_limits_is_not_armed(bus: Bus, servos: Scripte
     assert [memory[24] for memory in servos.memory.values()] == [0, 0, 0]
 
 
-def test_when_one_refuses_torque_none_keeps_it(bus: Bus, servos: ScriptedServos) -> None:
+def test_when_one_refuses_torque_the_others_lose_theirs(bus: Bus, servos: ScriptedServos) -> None:
     def refuse(instruction: bytes, answer: bytes) -> bytes:
         if instruction[2] == 3 and instruction[4] == WRITE and instruction[5] == 24:
             return packet(3, 2, 64)
@@ -209,6 +226,17 @@ def test_when_one_refuses_torque_none_keeps_it(bus: Bus, servos: ScriptedServos)
         armed(bus)
     assert bus.ping(1) is not None
     assert [memory[24] for memory in servos.memory.values()] == [0, 0, 0]
+
+
+def test_when_one_refuses_torque_those_that_held_go_on_holding(
+    bus: Bus, servos: ScriptedServos
+) -> None:
+    servos.memory[1][24] = 1
+    servos.answer = lambda i, answer: packet(3, 2, 64) if tuple(i[2:6]) == (3, 4, 3, 24) else answer
+    with pytest.raises(ServoError, match=r"joint_3 .*no torque"):
+        armed(bus)
+    assert bus.ping(1) is not None
+    assert [memory[24] for memory in servos.memory.values()] == [1, 0, 0]
 
 
 def test_wheels_get_no_goal_and_stand_still(bus: Bus, servos: ScriptedServos) -> None:
@@ -238,10 +266,11 @@ def test_disarm_needs_no_replies(bus: Bus, servos: ScriptedServos) -> None:
 def test_a_servo_that_lost_its_settings_is_found(
     address: int, value: int, words: str, bus: Bus, servos: ScriptedServos
 ) -> None:
-    info = handshake(bus, JOINTS, MODELS).servos[0]
     arm(bus, JOINTS, handshake(bus, JOINTS, MODELS).servos)
-    assert check_armed(bus, JOINTS[0], info) == ""
+    assert check_armed(bus, JOINTS[0]) == (True, "")
     servos.memory[1][address] = value
     if address == 34:
         servos.memory[1][35] = 0
-    assert words in check_armed(bus, JOINTS[0], info)
+    torque, wrong = check_armed(bus, JOINTS[0])
+    assert torque is (address != 24)
+    assert words in wrong

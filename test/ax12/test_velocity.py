@@ -18,6 +18,7 @@ from snake_control.ax12.units import (
     ticks_to_rad,
 )
 from snake_control.ax12.velocity import (
+    SEED_SPEED_RAW,
     GoalAndSpeed,
     JointModeVelocity,
     Present,
@@ -259,13 +260,68 @@ def test_a_pause_of_the_host_does_not_make_the_setpoint_run_away() -> None:
     assert abs(drive.control.setpoint - drive.servo.angle) < 0.1
 
 
-def test_without_fresh_readings_the_setpoint_is_the_origin() -> None:
+def test_before_the_first_reading_the_joint_holds() -> None:
     control = JointModeVelocity(LIMITS)
-    control.latch(0.1)
-    sent = control.step(0.5, PERIOD, Present(math.nan, math.nan, math.inf))
+    held = control.latch(0.1)
+    for _ in range(5):
+        assert control.step(0.5, PERIOD, Present(math.nan, math.nan, math.inf)) == held
+
+
+@pytest.mark.parametrize("velocity", [0.5 * UNIT, 0.5, -0.5, 3.0])
+def test_without_readings_the_joint_holds_where_it_was_seen_last(velocity: float) -> None:
+    drive = Drive(ServoModel(angle=-math.copysign(1.0, velocity)))
+    drive.run(velocity, 0.6)
+    last = drive.servo.measured(age=0.0)
+    age = 0.01
+    for _ in range(100):
+        drive.servo.run(drive.sent, PERIOD)
+        age += PERIOD
+        drive.sent = drive.control.step(velocity, PERIOD, last._replace(age=age))
+    assert abs(drive.servo.angle - last.angle) <= abs(velocity) * 0.15 + 6 * RAD_PER_TICK
+    assert abs(drive.control.setpoint - drive.servo.angle) <= 6 * RAD_PER_TICK
+
+
+def test_at_a_low_rate_of_the_bus_a_reading_of_the_last_cycle_is_fresh() -> None:
+    control = JointModeVelocity(limits(period=0.2, look_ahead=0.4))
+    control.latch(0.0)
+    sent = control.step(0.5, 0.2, Present(0.0, 0.0, 0.2))
     assert sent.goal_ticks is not None
-    ahead = ticks_to_rad(sent.goal_ticks) - 0.1
-    assert COMPLIANCE_TICKS * RAD_PER_TICK < ahead < 0.3
+    assert sent.goal_ticks > 512 + COMPLIANCE_TICKS
+
+
+def test_a_misread_speed_does_not_put_the_hold_ahead() -> None:
+    drive = Drive()
+    drive.run(0.3, 0.5)
+    misread = drive.servo.measured(age=0.03)._replace(rate=1023 * UNIT)
+    sent = drive.control.step(0.0, PERIOD, misread)
+    assert sent.goal_ticks is not None
+    assert ticks_to_rad(sent.goal_ticks) - drive.servo.angle <= 0.3 * 0.06 + 4 * RAD_PER_TICK
+
+
+def test_a_goal_is_never_outside_the_servos_own_limits() -> None:
+    """The servo would refuse it and go on to the goal it had."""
+    drive = Drive(
+        ServoModel(angle=ticks_to_rad(690)), limits=limits(upper_ticks=600, goal_ticks=(300, 700))
+    )
+    pushed = Present(ticks_to_rad(720), 0.0, 0.01)
+    drive.control.step(-0.5, PERIOD, pushed)
+    for velocity in (-0.5, 0.0, 0.5, 0.0):
+        sent = drive.control.step(velocity, PERIOD, pushed)
+        assert sent.goal_ticks is not None
+        assert 300 <= sent.goal_ticks <= 700
+    held = drive.control.latch(ticks_to_rad(720))
+    assert held.goal_ticks == 700
+
+
+def test_after_some_rest_the_hold_is_as_slow_as_at_activation() -> None:
+    drive = Drive()
+    drive.run(2.0, 0.3)
+    drive.run(0.0, 0.2)
+    assert drive.sent.speed_raw > 100
+    drive.run(0.0, 0.2)
+    assert drive.sent.speed_raw == SEED_SPEED_RAW
+    drive.cycle(2.0)
+    assert drive.sent.speed_raw > 100
 
 
 @pytest.mark.parametrize("share", [0.0003, -0.01, 0.2, -1.0])
