@@ -189,9 +189,7 @@ def joint_motion(message: JointState, names: Sequence[str]) -> tuple[Array, Arra
     return phi, phi_dot
 
 
-def head_velocity_command(
-    message: TwistStamped, stamp: float, world_frame_id: str
-) -> HeadVelocityCommand:
+def head_velocity_command(message: TwistStamped, world_frame_id: str) -> HeadVelocityCommand:
     """Return a velocity command for the head.
 
     ``header.frame_id`` says in which frame both linear and angular velocity are: empty or
@@ -199,7 +197,6 @@ def head_velocity_command(
 
     Args:
         message: the command.
-        stamp: when it was given [s], on the clock of the trajectory.
         world_frame_id: name of the world frame.
 
     Raises:
@@ -212,7 +209,7 @@ def head_velocity_command(
         )
     linear, angular = array(message.twist.linear), array(message.twist.angular)
     require_finite("twist", linear, angular)
-    return HeadVelocityCommand(stamp, linear, angular, in_heading_frame=frame == HEAD_FRAME)
+    return HeadVelocityCommand(linear, angular, in_heading_frame=frame == HEAD_FRAME)
 
 
 def require_frame(message: Any, frame_id: str) -> None:

@@ -12,6 +12,9 @@ from snake_control.nodes.conversions import MessageError, stamp_ns
 
 Value = TypeVar("Value")
 
+FUTURE_TOLERANCE_S = 0.005
+"""How far ahead of this computer's clock a stamp may be: what clock synchronisation leaves."""
+
 
 class Fault(enum.IntEnum):
     """What can be wrong with an input; the worst has the highest number."""
@@ -37,7 +40,7 @@ class Input(Generic[Value]):
 
         Args:
             name: the topic, for texts.
-            timeout_s: older (or further in the future) than this is no use.
+            timeout_s: older than this is no use; nor is anything from the future.
             convert: turns a message into a value, or raises ``MessageError``.
         """
         self.name = name
@@ -82,10 +85,10 @@ class Input(Generic[Value]):
         if self._fault:
             return Problem(Fault.INVALID, f"{self.name}: {self._fault}")
         age = self.age(now_ns)
-        if age < -self._timeout_s:
+        if age < -FUTURE_TOLERANCE_S:
             # It would look fresh for as long as the clocks differ.
             return Problem(
-                Fault.INVALID, f"{self.name}: stamped {-age:.2f} s ahead of this computer's clock"
+                Fault.INVALID, f"{self.name}: stamped {-age:.3f} s ahead of this computer's clock"
             )
         if age > self._timeout_s:
             return Problem(

@@ -1,4 +1,7 @@
-"""Node ``pose_input``: motion capture poses in, filtered head pose and twist with validity out."""
+"""Node ``pose_input``: motion capture poses in, filtered head pose and twist with validity out.
+
+Stamps are judged by ROS time; timers run on a steady clock, also under ``use_sim_time``.
+"""
 
 from __future__ import annotations
 
@@ -6,17 +9,20 @@ import collections
 from typing import Any
 
 from geometry_msgs.msg import PoseStamped
+from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from snake_interfaces.msg import PoseStatus
 
 from snake_control.control.head_filter import HeadFilter, Reason, Rejection
 from snake_control.nodes import topics
 from snake_control.nodes.conversions import array, header, odometry_message, stamp_ns
+from snake_control.nodes.inputs import FUTURE_TOLERANCE_S
 from snake_control.nodes.parameters import NodeParameters
 from snake_control.nodes.process import run
 
 _STATUS_PERIOD_S = 0.1
 _RATE_WINDOW_NS = 1_000_000_000
+_FUTURE_TOLERANCE_NS = round(FUTURE_TOLERANCE_S * 1e9)
 
 
 class PoseInput(Node):
@@ -26,6 +32,7 @@ class PoseInput(Node):
         super().__init__("pose_input", **overrides)
         self._config = NodeParameters(self, "pose_input").config.pose_input
         self._timeout_ns = round(self._config.timeout_s * 1e9)
+        self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._filter = HeadFilter(self._config.cutoff_hz, self._config.timeout_s)
         self._accepted = self._rejected = self._out_of_order = 0
         self._fault = ""
@@ -40,23 +47,21 @@ class PoseInput(Node):
         self._status = self.create_publisher(t.type, t.name, t.qos)
         t = topics.MOCAP_POSE
         self.create_subscription(t.type, t.name, self._on_pose, t.qos)
-        self.create_timer(_STATUS_PERIOD_S, self._publish_status)
+        self.create_timer(_STATUS_PERIOD_S, self._publish_status, clock=self._steady)
 
     def _on_pose(self, message: PoseStamped) -> None:
         now = self.get_clock().now().nanoseconds
-        self._arrivals.append(now)
+        self._arrivals.append(self._steady_ns())
         self._warn_of_frame(message.header.frame_id)
         stamp = stamp_ns(message)
         before = self._filter.estimate
-        if before is not None and before.stamp_ns > now + self._timeout_ns:
+        if before is not None and before.stamp_ns > now + _FUTURE_TOLERANCE_NS:
             self.get_logger().warning("the clock was set back: the filter starts anew")
             self._filter.reset()
         ahead = stamp - now
-        if ahead > self._timeout_ns:
+        if ahead > _FUTURE_TOLERANCE_NS:
             # Once accepted, it would make every later pose look out of order.
-            self._reject(
-                f"pose is stamped {ahead * 1e-9:.2f} s ahead of this computer's clock", now
-            )
+            self._reject(f"pose is stamped {ahead * 1e-9:.3f} s ahead of this computer's clock")
         else:
             result = self._filter.update(
                 stamp, array(message.pose.position), array(message.pose.orientation)
@@ -70,19 +75,23 @@ class PoseInput(Node):
             elif result.reason is Reason.OUT_OF_ORDER:
                 self._out_of_order += 1
             else:
-                self._reject(result.text, now)
+                self._reject(result.text)
         if self._judge(now)[0] != self._published_status:
             self._publish_status()
 
-    def _reject(self, text: str, now: int) -> None:
+    def _steady_ns(self) -> int:
+        return self._steady.now().nanoseconds
+
+    def _reject(self, text: str) -> None:
         self._rejected += 1
         self._fault = text
-        self._fault_ns = now
+        self._fault_ns = self._steady_ns()
 
     def _judge(self, now: int) -> tuple[int, str]:
         """Status and text at time ``now`` [ns]."""
         estimate = self._filter.estimate
-        if self._fault and (now - self._fault_ns <= self._timeout_ns or estimate is None):
+        since_fault_ns = self._steady_ns() - self._fault_ns
+        if self._fault and (since_fault_ns <= self._timeout_ns or estimate is None):
             return PoseStatus.STATUS_INVALID, self._fault
         if estimate is None:
             return PoseStatus.STATUS_WAITING, "no pose received yet on mocap/pose"
@@ -90,7 +99,7 @@ class PoseInput(Node):
         if age <= self._config.timeout_s:
             return PoseStatus.STATUS_VALID, "valid"
         text = f"the last good pose is {age:.2f} s old (limit {self._config.timeout_s:g} s)"
-        if self._rate(now) > 0:
+        if self._rate() > 0:
             text += "; poses do arrive: are the clocks of both computers synchronised?"
         return PoseStatus.STATUS_STALE, text
 
@@ -114,12 +123,13 @@ class PoseInput(Node):
                 accepted=self._accepted,
                 rejected=self._rejected,
                 out_of_order=self._out_of_order,
-                rate=self._rate(now),
+                rate=self._rate(),
             )
         )
 
-    def _rate(self, now: int) -> float:
+    def _rate(self) -> float:
         """Arrival frequency over the last second [Hz]."""
+        now = self._steady_ns()
         while self._arrivals and now - self._arrivals[0] > _RATE_WINDOW_NS:
             self._arrivals.popleft()
         if len(self._arrivals) < 2:

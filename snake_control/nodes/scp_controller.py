@@ -2,6 +2,7 @@
 
 Every step sends a command, zeros unless the reference is tracked, so that the bus driver knows that
 the controller is alive; and a ``controller_state`` with a status that names what is in the way.
+Stamps are judged by ROS time; timers run on a steady clock, also under ``use_sim_time``.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from snake_interfaces.msg import ControllerState
 from std_srvs.srv import SetBool
@@ -54,7 +56,8 @@ class ScpControllerNode(Node):
         self._controller = ScpController(config.robot, config.controller)
         self._enabled = own.enabled
         self._status: int | None = None
-        self._origin_ns = self.get_clock().now().nanoseconds
+        self._steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._origin_ns = self._steady.now().nanoseconds
         # Roll, pitch and yaw go on without jumps by whole turns.
         self._rpy = np.zeros(3)
         self._rpy_d = np.zeros(3)
@@ -88,8 +91,8 @@ class ScpControllerNode(Node):
         t = topics.MARKERS
         self._markers = self.create_publisher(t.type, t.name, t.qos)
         self.create_service(topics.ENABLE.type, topics.ENABLE.name, self._on_enable)
-        self.create_timer(1.0 / own.rate_hz, self._on_timer)
-        self.create_timer(_MARKERS_PERIOD_S, self._publish_markers)
+        self.create_timer(1.0 / own.rate_hz, self._on_timer, clock=self._steady)
+        self.create_timer(_MARKERS_PERIOD_S, self._publish_markers, clock=self._steady)
 
     def _on_parameters(self, config: Config) -> None:
         self._case = config.controller.case
@@ -157,7 +160,7 @@ class ScpControllerNode(Node):
     def _control(self, step: Step, q_dot: NDArray[np.float64]) -> None:
         q = np.concatenate([step.w, step.phi])
         reference = Reference(step.w_d, step.w_d_dot)
-        t = (step.stamp_ns - self._origin_ns) * 1e-9
+        t = (self._steady.now().nanoseconds - self._origin_ns) * 1e-9
         step.status = ControllerState.STATUS_FAULT
         try:
             result = self._controller.step(q, q_dot, reference, t)

@@ -2,7 +2,11 @@
 
 Nothing is sent before ``~/start`` (or the parameter ``autostart``) or ``cmd_vel``. ``~/stop``, or
 ``cmd_vel`` that ceases, brings the reference to rest; then it is no longer sent, and the controller
-reports a stale reference and commands zero. ``cmd_vel`` takes over from whatever is being followed.
+reports a stale reference and commands zero. ``cmd_vel`` takes over from whatever is being followed,
+unless it is zero: a joystick at rest starts and takes over nothing.
+
+Motion follows a steady clock, also under ``use_sim_time``; ROS time only stamps the messages. So a
+clock that is set moves nothing.
 """
 
 from __future__ import annotations
@@ -13,6 +17,7 @@ from geometry_msgs.msg import PoseStamped, TwistStamped
 from nav_msgs.msg import Path
 from numpy import float64
 from numpy.typing import NDArray
+from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from std_srvs.srv import Trigger
 
@@ -26,7 +31,7 @@ from snake_control.nodes.conversions import (
     reference_message,
     stamp_ns,
 )
-from snake_control.nodes.inputs import Input
+from snake_control.nodes.inputs import FUTURE_TOLERANCE_S, Input
 from snake_control.nodes.parameters import NodeParameters
 from snake_control.nodes.process import run
 from snake_control.trajectory.sequence import Outcome, ReferenceSequence
@@ -45,7 +50,8 @@ class TrajectoryGenerator(Node):
         self._config = config
         self._sequence = ReferenceSequence(config)
         self._autostart = config.autostart
-        self._origin_ns = self.get_clock().now().nanoseconds
+        self._steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._origin_ns = self._steady.now().nanoseconds
         self._cmd_vel_stamp_ns = 0
         self._has_path = False
         self._head = Input(
@@ -64,14 +70,14 @@ class TrajectoryGenerator(Node):
         self.create_subscription(t.type, t.name, self._on_cmd_vel, t.qos)
         self.create_service(topics.START.type, topics.START.name, self._on_start)
         self.create_service(topics.STOP.type, topics.STOP.name, self._on_stop)
-        self.create_timer(1.0 / config.rate_hz, self._step)
+        self.create_timer(1.0 / config.rate_hz, self._step, clock=self._steady)
 
     def _now(self) -> int:
         return self.get_clock().now().nanoseconds
 
-    def _seconds(self, time_ns: int) -> float:
-        """Time since the node's start, small enough to keep all digits."""
-        return (time_ns - self._origin_ns) * 1e-9
+    def _steady_s(self) -> float:
+        """Time since the node's start by the steady clock [s], small enough to keep all digits."""
+        return (self._steady.now().nanoseconds - self._origin_ns) * 1e-9
 
     def _head_pose(self, now: int) -> NDArray[float64] | None:
         return None if self._head.problem(now) else self._head.value
@@ -80,7 +86,7 @@ class TrajectoryGenerator(Node):
         now = self._now()
         if self._autostart and self._head_pose(now) is not None:
             self._start(now)
-        reference = self._sequence.sample(self._seconds(now))
+        reference = self._sequence.sample(self._steady_s())
         if reference is not None:
             self._reference.publish(reference_message(reference, now, self._config.frame_id))
             if self._sequence.idle:
@@ -89,7 +95,7 @@ class TrajectoryGenerator(Node):
     def _start(self, now: int) -> Outcome:
         # A start by hand, or one that cmd_vel made, is not repeated by itself later.
         self._autostart = False
-        outcome = self._sequence.start(self._seconds(now), self._head_pose(now))
+        outcome = self._sequence.start(self._steady_s(), self._head_pose(now))
         if outcome.done:
             self._publish_path(now)
         self.get_logger().info(f"start: {outcome.text}")
@@ -103,7 +109,7 @@ class TrajectoryGenerator(Node):
     def _on_stop(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         now = self._now()
         self._autostart = False
-        outcome = self._sequence.stop(self._seconds(now))
+        outcome = self._sequence.stop(self._steady_s())
         self._publish_path(now)
         self.get_logger().info(f"stop: {outcome.text}")
         response.success, response.message = outcome.done, outcome.text
@@ -116,21 +122,25 @@ class TrajectoryGenerator(Node):
         age = (now - stamp) * 1e-9
         limit = self._config.cmd_vel_timeout_s
         try:
-            if abs(age) > limit:
+            if age < -FUTURE_TOLERANCE_S:
+                raise MessageError(f"it is stamped {-age:.3f} s ahead of this computer's clock")
+            if age > limit:
                 raise MessageError(f"its stamp is {age:.2f} s old (limit {limit:g} s)")
             if stamp < self._cmd_vel_stamp_ns <= now:
                 raise MessageError("it is older than the one before it")
-            # A stamp in the future must not lengthen the dead-man time-out.
-            t = self._seconds(min(stamp, now))
-            command = head_velocity_command(message, t, self._config.frame_id)
+            command = head_velocity_command(message, self._config.frame_id)
         except MessageError as error:
             self._ignore_cmd_vel(str(error))
             return
         self._cmd_vel_stamp_ns = stamp
         was_idle = self._sequence.idle
-        outcome = self._sequence.command(command, self._seconds(now), self._head_pose(now))
+        # A stamp in the future must not lengthen the dead-man time-out.
+        outcome = self._sequence.command(
+            command, self._steady_s(), self._head_pose(now), max(age, 0.0)
+        )
         if not outcome.done:
             self._ignore_cmd_vel(outcome.text)
+        if not self._sequence.commanded:
             return
         self._autostart = False
         if was_idle:
@@ -149,10 +159,9 @@ class TrajectoryGenerator(Node):
         frame = self._config.frame_id
         path = Path(header=header(now, frame))
         if line is not None:
+            start_ns = now - round(self._sequence.motion_time(self._steady_s()) * 1e9)
             path.poses = [
-                PoseStamped(
-                    header=header(self._origin_ns + round(t * 1e9), frame), pose=pose_message(w_d)
-                )
+                PoseStamped(header=header(start_ns + round(t * 1e9), frame), pose=pose_message(w_d))
                 for t, w_d in line.path(_PATH_POINTS, _ENDLESS_PATH_S)
             ]
         self._path.publish(path)

@@ -20,6 +20,3 @@ class HeadTrajectory(Protocol):
         Times are asked for in rising order; a time before the last one gives that one's answer
         where the motion depends on what happened in between.
         """
-
-    def at_rest(self, t: float) -> bool:
-        """Whether the head stands still from ``t`` on, unless somebody commands otherwise."""

@@ -18,7 +18,3 @@ class Hold:
     def sample(self, t: float) -> Reference:
         """Return the pose with zero rate, whatever ``t``."""
         return self._reference
-
-    def at_rest(self, t: float) -> bool:
-        """True at all times."""
-        return True

@@ -44,10 +44,6 @@ class Line:
             self._velocity if moving else np.zeros(6),
         )
 
-    def at_rest(self, t: float) -> bool:
-        """Whether the end is reached, or the line does not move at all."""
-        return self._is_over(t - self._start) or not self._velocity.any()
-
     def path(self, points: int, endless_s: float) -> list[tuple[float, Array]]:
         """Return evenly spaced (time [s], pose (6,)) from the start to the end.
 

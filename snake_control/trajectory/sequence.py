@@ -34,6 +34,10 @@ class ReferenceSequence:
     Idle at first: there is no reference until ``start`` or ``command``, so the robot does not move
     by itself. ``stop``, or commands that cease, decelerate the head to rest; after that there is
     no reference any more. The held end of a line goes on until ``stop`` or ``command``.
+
+    ``now`` is the time of a steady clock [s], in rising order. The motion's own time follows it
+    from sample to sample, but by no more than two sample periods at once: after a stall the
+    reference goes on from where it was, and does not make up for the time lost.
     """
 
     def __init__(self, config: TrajectoryGeneratorConfig) -> None:
@@ -45,7 +49,11 @@ class ReferenceSequence:
             linear_acceleration=config.max_linear_acceleration_m_s2,
             angular_acceleration=config.max_angular_acceleration_rad_s2,
         )
+        self._longest_step = 2.0 / config.rate_hz
+        self._t = 0.0
+        self._sampled_at: float | None = None
         self._trajectory: HeadTrajectory | None = None
+        self._command_ends = 0.0
 
     @property
     def idle(self) -> bool:
@@ -54,14 +62,25 @@ class ReferenceSequence:
 
     @property
     def line(self) -> Line | None:
-        """The line being followed, if it is one."""
+        """The line being followed, if it is one; in the motion's own time."""
         return self._trajectory if isinstance(self._trajectory, Line) else None
 
-    def start(self, t: float, head: Array | None) -> Outcome:
-        """Follow the configured trajectory from time ``t`` [s].
+    @property
+    def commanded(self) -> bool:
+        """Whether a velocity command is being followed."""
+        return isinstance(self._trajectory, Teleop) and self._trajectory.commanded
+
+    def motion_time(self, now: float) -> float:
+        """Return the motion's own time at ``now`` [s]."""
+        if self._sampled_at is None:
+            return self._t
+        return self._t + min(max(now - self._sampled_at, 0.0), self._longest_step)
+
+    def start(self, now: float, head: Array | None) -> Outcome:
+        """Follow the configured trajectory from now on.
 
         Args:
-            t: now.
+            now: time of the steady clock [s].
             head: w of the head now, shape (6,), ``None`` if it is not known.
         """
         if self._trajectory is not None:
@@ -76,45 +95,62 @@ class ReferenceSequence:
             if head is None:
                 return Outcome(False, _NO_HEAD)
             start_pose = head
-        self._trajectory = Line(start_pose, self._config.velocity, t, self._config.duration_s)
+        self._trajectory = Line(
+            start_pose, self._config.velocity, self.motion_time(now), self._config.duration_s
+        )
         return Outcome(True, f"following the line from {self._config.start_from}")
 
-    def stop(self, t: float) -> Outcome:
-        """Bring the head to rest from what it does at time ``t`` [s], then give no reference."""
+    def stop(self, now: float) -> Outcome:
+        """Bring the head to rest from what it does at ``now`` [s], then give no reference."""
         if self._trajectory is None:
             return Outcome(True, "nothing to stop")
-        self._trajectory = self._teleop(self._trajectory.sample(t), t)
+        self._trajectory = self._teleop(now)
         return Outcome(True, "coming to rest")
 
-    def command(self, command: HeadVelocityCommand, t: float, head: Array | None) -> Outcome:
-        """Follow a velocity command.
+    def command(
+        self, command: HeadVelocityCommand, now: float, head: Array | None, age: float = 0.0
+    ) -> Outcome:
+        """Follow a velocity command, until the next one or for ``cmd_vel_timeout_s`` (dead-man).
 
         It starts at the reference being followed, with its rate, or else at the head, at rest.
+        A zero command only counts after others: a joystick at rest starts and takes over nothing.
 
         Args:
             command: wanted velocities.
-            t: now [s].
+            now: time of the steady clock [s].
             head: w of the head now, shape (6,), ``None`` if it is not known.
+            age: how long ago the command was given [s].
         """
-        if not isinstance(self._trajectory, Teleop):
-            if self._trajectory is not None:
-                start = self._trajectory.sample(t)
-            elif head is not None:
-                start = Reference(head, np.zeros(6))
-            else:
+        if command.is_zero and not self.commanded:
+            return Outcome(True, "a zero command changes nothing here")
+        teleop = self._trajectory
+        if not isinstance(teleop, Teleop):
+            if teleop is None and head is None:
                 return Outcome(False, _NO_HEAD)
-            self._trajectory = self._teleop(start, t)
-        self._trajectory.command(command)
+            self._trajectory = teleop = self._teleop(now, head)
+        teleop.command(command)
+        self._command_ends = now - age + self._config.cmd_vel_timeout_s
         return Outcome(True, "following cmd_vel")
 
-    def sample(self, t: float) -> Reference | None:
-        """Return the reference at time ``t`` [s], ``None`` if there is none."""
+    def sample(self, now: float) -> Reference | None:
+        """Return the reference at ``now`` [s], ``None`` if there is none."""
+        self._t = self.motion_time(now)
+        self._sampled_at = now
         if self._trajectory is None:
             return None
-        reference = self._trajectory.sample(t)
-        if isinstance(self._trajectory, Teleop) and self._trajectory.at_rest(t):
+        teleop = self._trajectory if isinstance(self._trajectory, Teleop) else None
+        if teleop is not None and now > self._command_ends:
+            teleop.release()
+        reference = self._trajectory.sample(self._t)
+        if teleop is not None and teleop.at_rest:
             self._trajectory = None
         return reference
 
-    def _teleop(self, start: Reference, t: float) -> Teleop:
-        return Teleop(start, t, self._limits, self._config.cmd_vel_timeout_s)
+    def _teleop(self, now: float, head: Array | None = None) -> Teleop:
+        t = self.motion_time(now)
+        if self._trajectory is not None:
+            start = self._trajectory.sample(t)
+        else:
+            assert head is not None
+            start = Reference(head, np.zeros(6))
+        return Teleop(start, t, self._limits)

@@ -23,39 +23,55 @@ class HeadVelocityCommand:
     """How the head shall move.
 
     Attributes:
-        stamp: when this was commanded [s], on the clock of ``sample``.
         linear: velocity of the tip, shape (3,) [m/s].
         angular: angular velocity of the head, shape (3,) [rad/s].
         in_heading_frame: both are given in the frame that has the head's yaw and is otherwise
             level (x ahead, y left, z up); else in the world.
     """
 
-    stamp: float
     linear: Array
     angular: Array
     in_heading_frame: bool = False
+
+    @property
+    def is_zero(self) -> bool:
+        """Whether the head shall stand still."""
+        return not (self.linear.any() or self.angular.any())
 
 
 class Teleop:
     """Integrates velocity commands from a pose and rate that are given at the start.
 
-    Speed and acceleration are limited. A command counts for ``timeout`` seconds (dead-man): after
-    that the head is brought to rest. Without any command the motion given at the start is brought
-    to rest, which is how a running trajectory is stopped.
+    Speed and acceleration are limited. A command counts until the next one or ``release``. Without
+    any command the head is brought to rest, from the motion given at the start too, which is how a
+    running trajectory is stopped.
     """
 
-    def __init__(self, start: Reference, t: float, limits: MotionLimits, timeout: float) -> None:
+    def __init__(self, start: Reference, t: float, limits: MotionLimits) -> None:
         """Start at time ``t`` [s] with the pose and rate of ``start``."""
         self._pose = np.array(start.w_d, dtype=float)
         self._rate = np.array(start.w_d_dot, dtype=float)
         self._t = t
         self._limits = limits
-        self._timeout = timeout
         self._command: HeadVelocityCommand | None = None
 
     def command(self, command: HeadVelocityCommand) -> None:
         """Follow ``command`` from the next sample on."""
         self._command = command
+
+    def release(self) -> None:
+        """Bring the head to rest from the next sample on: nobody commands any more."""
+        self._command = None
+
+    @property
+    def commanded(self) -> bool:
+        """Whether a command counts."""
+        return self._command is not None
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether no command counts and the head has stopped."""
+        return self._command is None and not self._rate.any()
 
     def sample(self, t: float) -> Reference:
         """Integrate to time ``t`` [s] and return pose and rate there."""
@@ -68,26 +84,17 @@ class Teleop:
             self._t = t
         return Reference(self._pose.copy(), self._rate.copy())
 
-    def at_rest(self, t: float) -> bool:
-        """Whether no command counts at ``t`` any more and the head has stopped."""
-        return not self._is_commanded(t) and not self._rate.any()
-
-    def _is_commanded(self, t: float) -> bool:
-        return self._command is not None and t - self._command.stamp <= self._timeout
-
     def _step(self, dt: float) -> None:
-        self._t += dt
-        wanted = self._wanted_rate(dt) if self._is_commanded(self._t) else np.zeros(6)
+        wanted = np.zeros(6) if self._command is None else self._wanted_rate(self._command, dt)
         rate = self._limits.approach(self._rate, wanted, dt)
         self._pose += (self._rate + rate) / 2 * dt
         self._rate = rate
 
-    def _wanted_rate(self, dt: float) -> Array:
-        assert self._command is not None
-        linear = shorten(self._command.linear, self._limits.linear_speed)
-        angular = shorten(self._command.angular, self._limits.angular_speed)
+    def _wanted_rate(self, command: HeadVelocityCommand, dt: float) -> Array:
+        linear = shorten(command.linear, self._limits.linear_speed)
+        angular = shorten(command.angular, self._limits.angular_speed)
         _, pitch, yaw = self._pose[3:]
-        if self._command.in_heading_frame:
+        if command.in_heading_frame:
             c, s = math.cos(yaw), math.sin(yaw)
             to_world = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
             linear = to_world @ linear

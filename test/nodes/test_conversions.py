@@ -142,8 +142,7 @@ def test_frame_of_cmd_vel(frame, heading):
     message = TwistStamped(header=c.header(0, frame))
     message.twist.linear.x = 0.1
     message.twist.angular.z = 0.2
-    command = c.head_velocity_command(message, 7.0, "world")
-    assert command.stamp == 7.0
+    command = c.head_velocity_command(message, "world")
     assert command.in_heading_frame is heading
     np.testing.assert_array_equal(command.linear, [0.1, 0, 0])
     np.testing.assert_array_equal(command.angular, [0, 0, 0.2])
@@ -151,8 +150,8 @@ def test_frame_of_cmd_vel(frame, heading):
 
 def test_bad_cmd_vel_is_refused():
     with pytest.raises(c.MessageError, match="'base_link'"):
-        c.head_velocity_command(TwistStamped(header=c.header(0, "base_link")), 0.0, "world")
+        c.head_velocity_command(TwistStamped(header=c.header(0, "base_link")), "world")
     message = TwistStamped()
     message.twist.linear.z = math.nan
     with pytest.raises(c.MessageError, match="not finite"):
-        c.head_velocity_command(message, 0.0, "world")
+        c.head_velocity_command(message, "world")

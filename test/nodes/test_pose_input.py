@@ -11,6 +11,7 @@ from snake_interfaces.msg import PoseStatus
 from snake_control.model.rotation import quaternion_from_rpy
 from snake_control.nodes import topics
 from snake_control.nodes.conversions import array, head_motion, header, point, quaternion, stamp_ns
+from support.clock import SettableClock
 from support.graph import CONFIG, Graph
 
 MS = 1_000_000
@@ -20,13 +21,13 @@ RPY = np.array([0.1, -0.8, 2.5])
 class Mocap:
     """A motion capture system whose poses a test makes."""
 
-    def __init__(self, graph, reliability=ReliabilityPolicy.BEST_EFFORT):
+    def __init__(self, graph, reliability=ReliabilityPolicy.BEST_EFFORT, **params):
         self.graph = graph
         self.odometry = graph.subscribe(topics.HEAD_ODOMETRY)
         self.status = graph.subscribe(topics.HEAD_STATUS)
         qos = QoSProfile(depth=5, reliability=reliability)
         self.publisher = graph.node.create_publisher(PoseStamped, topics.MOCAP_POSE.name, qos)
-        graph.start("pose_input", params_files=[CONFIG / "paper_robot.yaml"])
+        graph.start("pose_input", params_files=[CONFIG / "paper_robot.yaml"], params=params)
         graph.wait_for(self.publisher.get_subscription_count, 30.0, "pose_input")
 
     def send(self, stamp, position=(0.0, 0.0, 0.3), rotation=None, frame="world"):
@@ -129,7 +130,7 @@ def test_a_pose_from_the_future_is_refused(mocap):
     mocap.send_until_valid()
 
     def noticed():
-        mocap.send(mocap.graph.now_ns() + 5000 * MS)
+        mocap.send(mocap.graph.now_ns() + 90 * MS)
         return "ahead of this computer's clock" in mocap.status.last.text
 
     mocap.graph.wait_for(noticed, 20.0, "the clocks found apart")
@@ -179,3 +180,22 @@ def test_reliable_poses_of_another_frame_are_taken_with_a_warning():
         np.testing.assert_allclose(array(mocap.odometry.last.pose.pose.position), [0, 0, 0.3])
         report = graph.report()
         assert "mocap_volume" in report
+
+
+def test_poses_go_on_while_the_clock_is_set_back():
+    with Graph() as graph:
+        clock = SettableClock(graph)
+        mocap = Mocap(graph, use_sim_time=True)
+        clock.wait_for_listener()
+
+        def arrived():
+            mocap.send(clock.now_ns())
+            return mocap.odometry.last and (
+                abs(stamp_ns(mocap.odometry.last) - clock.now_ns()) < 1000 * MS
+            )
+
+        graph.wait_for(arrived, 20.0, "odometry")
+        clock.offset_s = -3600.0
+        graph.wait_for(arrived, 20.0, "odometry by the new time")
+        mocap.status.clear()
+        graph.wait_for(lambda: len(mocap.status.messages) > 3, 10.0, "statuses")

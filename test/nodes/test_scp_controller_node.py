@@ -11,6 +11,7 @@ from snake_control.control.scp_controller import ScpController
 from snake_control.model.floor import head_pose_on_floor
 from snake_control.nodes import topics
 from snake_control.nodes.conversions import stamp_ns
+from support.clock import SettableClock
 from support.controller_rig import GOOD, ControllerRig
 from support.graph import CONFIG, Graph
 
@@ -243,6 +244,24 @@ def test_speed_limit_is_named():
         np.testing.assert_allclose(
             state.u, np.array(state.u_unlimited) * state.speed_scale, rtol=1e-9
         )
+
+
+def test_commands_go_on_while_the_clock_is_set_back():
+    with Graph() as graph:
+        clock = SettableClock(graph)
+        rig = ControllerRig(graph)
+        graph.start(NODE, params_files=[PAPER_ROBOT], params={"use_sim_time": True})
+        clock.wait_for_listener()
+        rig.wait_status(*GOOD, what="tracking")
+        clock.offset_s = -3600.0
+        graph.wait_for(
+            lambda: stamp_ns(rig.commands.last) < graph.now_ns() - 3.5e12, 10.0, "the new time"
+        )
+        count = len(rig.commands.messages)
+        graph.wait_for(lambda: len(rig.commands.messages) > count + 20, 10.0, "more commands")
+        # Its inputs are stamped by a clock that is an hour ahead now.
+        assert rig.states.last.status == ControllerState.STATUS_INVALID
+        assert is_zero(rig.commands.last)
 
 
 def test_the_last_command_of_a_stopped_controller_is_rest():

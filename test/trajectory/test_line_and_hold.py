@@ -15,7 +15,6 @@ def test_table_1_line():
     reference = line.sample(160.0)
     np.testing.assert_allclose(reference.w_d, START + 60 * VELOCITY, rtol=1e-14)
     np.testing.assert_array_equal(reference.w_d_dot, VELOCITY)
-    assert not line.at_rest(1e6)
 
 
 def test_start_is_held_before_and_the_end_after():
@@ -24,8 +23,6 @@ def test_start_is_held_before_and_the_end_after():
         reference = line.sample(t)
         np.testing.assert_allclose(reference.w_d, START + elapsed * VELOCITY, rtol=1e-14)
         np.testing.assert_array_equal(reference.w_d_dot, rate * VELOCITY)
-    assert not line.at_rest(14.9)
-    assert line.at_rest(15.0)
 
 
 def test_pose_is_continuous_across_start_and_end():
@@ -57,4 +54,3 @@ def test_hold_holds_a_copy():
     for t in (0.0, 1e6):
         np.testing.assert_array_equal(hold.sample(t).w_d, START)
         np.testing.assert_array_equal(hold.sample(t).w_d_dot, np.zeros(6))
-    assert hold.at_rest(0.0)
