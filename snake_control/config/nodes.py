@@ -94,6 +94,16 @@ class ScpControllerConfig:
     reference_timeout_s: float = parameter(
         0.2, "reference older than this commands zero [s]", low=0.02, high=10.0
     )
+    max_position_error_m: float = parameter(
+        0.3,
+        "a head further than this from its reference gets zero velocity: the robot was stopped, "
+        "or a pose is wrong; it must not lunge after the reference [m]",
+        low=1e-3,
+        high=1000.0,
+    )
+    max_rotation_error_rad: float = parameter(
+        2.5, "the same for roll, pitch and yaw, each [rad]", low=0.01, high=4.0
+    )
     enabled: bool = parameter(True, "follow references from the start (see ~/enable)")
     frame_id: str = parameter("world", "frame in which head pose and reference are given")
 

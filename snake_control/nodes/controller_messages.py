@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import array
 import dataclasses
 import math
 
@@ -11,7 +12,7 @@ from snake_interfaces.msg import ControllerState, JointVelocityCommand
 
 from snake_control.config import RobotConfig
 from snake_control.control.scp_controller import ControlResult
-from snake_control.nodes.conversions import header
+from snake_control.model.rotation import wrap
 
 Array = NDArray[np.float64]
 
@@ -45,6 +46,13 @@ class Step:
     head_age: float = math.inf
     reference_age: float = math.inf
 
+    @property
+    def error(self) -> Array:
+        """Tracking error w - w_d with the angles wrapped to +-pi, shape (6,) [m, rad]; NaN while unknown."""
+        error: Array = self.w - self.w_d
+        error[3:] = wrap(error[3:])
+        return error
+
     @staticmethod
     def at(stamp_ns: int, robot: RobotConfig) -> Step:
         """Return a step that knows nothing yet."""
@@ -66,66 +74,99 @@ def judge(step: Step, result: ControlResult, robot: RobotConfig) -> None:
     step.text = "; ".join(found) or "tracking"
 
 
-def velocity_command(step: Step, robot: RobotConfig) -> JointVelocityCommand:
-    """Return the command of a step: the control law's velocities, or zeros."""
-    return JointVelocityCommand(
-        header=header(step.stamp_ns),
-        name=list(robot.joint_names),
-        velocity=[0.0] * robot.joints if step.result is None else step.result.u.tolist(),
-    )
+def too_far(step: Step, max_position_error_m: float, max_rotation_error_rad: float) -> str:
+    """Return by how much the head is too far from its reference, empty if it is not."""
+    error = step.error
+    distance = float(np.linalg.norm(error[:3]))
+    if distance > max_position_error_m:
+        return (
+            f"the head is {distance:.3g} m from its reference "
+            f"(limit max_position_error_m = {max_position_error_m:g})"
+        )
+    worst = int(np.argmax(np.abs(error[3:])))
+    angle = float(abs(error[3 + worst]))
+    if angle > max_rotation_error_rad:
+        return (
+            f"{('roll', 'pitch', 'yaw')[worst]} of the head is {angle:.3g} rad from its reference "
+            f"(limit max_rotation_error_rad = {max_rotation_error_rad:g})"
+        )
+    return ""
 
 
-def controller_state(
-    step: Step, robot: RobotConfig, case: int, frame_id: str, step_time: float
-) -> ControllerState:
-    """Return everything a step decided; NaN where it decided nothing.
+class ControllerMessages:
+    """Makes the messages of a step; each is the same object every time, filled anew.
 
-    Args:
-        step: the step.
-        robot: for the names of joints.
-        case: preset of sub-tasks in force.
-        frame_id: frame of w and w_d.
-        step_time: how long it took to compute [s].
+    Making them takes longer than filling them.
     """
-    names = robot.joint_names
-    message = ControllerState(
-        header=header(step.stamp_ns, frame_id),
-        status=step.status,
-        text=step.text,
-        experiment_case=case,
-        w=step.w,
-        w_d=step.w_d,
-        w_d_dot=step.w_d_dot,
-        error=_nothing(),
-        name=list(names),
-        phi=step.phi.tolist(),
-        u_unlimited=[0.0] * robot.joints,
-        u=[0.0] * robot.joints,
-        scp_name=[names[j - 1] for j in robot.scp_joints],
-        phi_tilde_dot_d=[0.0] * len(robot.scp_joints),
-        speed_scale=1.0,
-        v_h=math.nan,
-        v_b1=math.nan,
-        d_min=math.nan,
-        sigma_min_b_tilde=math.nan,
-        sigma_min_a_hat=math.nan,
-        joint_states_age=step.joint_states_age,
-        head_age=step.head_age,
-        reference_age=step.reference_age,
-        step_time=step_time,
-    )
-    result = step.result
-    if result is not None:
-        message.error = result.error
-        message.u_unlimited = result.u_unlimited.tolist()
-        message.u = result.u.tolist()
-        message.phi_tilde_dot_d = result.phi_tilde_dot_d.tolist()
-        message.speed_scale = float(result.speed_scale)
-        message.speed_limited = [names[j - 1] for j in result.speed_limited]
-        message.range_limited = [names[j - 1] for j in result.range_limited]
-        message.v_h = float(result.V_h)
-        message.v_b1 = float(result.V_b1)
-        message.d_min = float(result.d_min)
-        message.sigma_min_b_tilde = float(result.sigma_min_B_tilde)
-        message.sigma_min_a_hat = float(result.sigma_min_A_hat)
-    return message
+
+    def __init__(self, robot: RobotConfig, frame_id: str) -> None:
+        """Prepare for a robot; ``frame_id`` is that of w and w_d."""
+        names = list(robot.joint_names)
+        self._names = names
+        self._at_rest = _array(np.zeros(robot.joints))
+        self._no_scp = _array(np.zeros(len(robot.scp_joints)))
+        self._command = JointVelocityCommand(name=names)
+        self._state = ControllerState(
+            name=names, scp_name=[names[joint - 1] for joint in robot.scp_joints]
+        )
+        self._state.header.frame_id = frame_id
+
+    def command(self, step: Step) -> JointVelocityCommand:
+        """Return the command of a step: the control law's velocities, or zeros."""
+        message = self._command
+        _stamp(message, step.stamp_ns)
+        message.velocity = self._at_rest if step.result is None else _array(step.result.u)
+        return message
+
+    def state(self, step: Step, case: int, step_time: float) -> ControllerState:
+        """Return everything a step decided; NaN where it decided nothing.
+
+        Args:
+            step: the step.
+            case: preset of sub-tasks in force.
+            step_time: how long it took to compute [s].
+        """
+        message = self._state
+        _stamp(message, step.stamp_ns)
+        message.status = step.status
+        message.text = step.text
+        message.experiment_case = case
+        message.w = step.w
+        message.w_d = step.w_d
+        message.w_d_dot = step.w_d_dot
+        message.error = step.error
+        message.phi = _array(step.phi)
+        message.joint_states_age = step.joint_states_age
+        message.head_age = step.head_age
+        message.reference_age = step.reference_age
+        message.step_time = step_time
+        result = step.result
+        if result is None:
+            message.u_unlimited = message.u = self._at_rest
+            message.phi_tilde_dot_d = self._no_scp
+            message.speed_scale = 1.0
+            message.speed_limited = message.range_limited = []
+            message.v_h = message.v_b1 = message.d_min = math.nan
+            message.sigma_min_b_tilde = message.sigma_min_a_hat = math.nan
+        else:
+            message.u_unlimited = _array(result.u_unlimited)
+            message.u = _array(result.u)
+            message.phi_tilde_dot_d = _array(result.phi_tilde_dot_d)
+            message.speed_scale = float(result.speed_scale)
+            message.speed_limited = [self._names[j - 1] for j in result.speed_limited]
+            message.range_limited = [self._names[j - 1] for j in result.range_limited]
+            message.v_h = float(result.V_h)
+            message.v_b1 = float(result.V_b1)
+            message.d_min = float(result.d_min)
+            message.sigma_min_b_tilde = float(result.sigma_min_B_tilde)
+            message.sigma_min_a_hat = float(result.sigma_min_A_hat)
+        return message
+
+
+def _array(values: Array) -> array.array[float]:
+    return array.array("d", values.tobytes())
+
+
+def _stamp(message: JointVelocityCommand | ControllerState, stamp_ns: int) -> None:
+    stamp = message.header.stamp
+    stamp.sec, stamp.nanosec = divmod(stamp_ns, 1_000_000_000)

@@ -27,6 +27,7 @@ STATUS_WORDS = {
     ControllerState.STATUS_STALE: "stale",
     ControllerState.STATUS_INVALID: "invalid",
     ControllerState.STATUS_FAULT: "fault",
+    ControllerState.STATUS_ERROR_TOO_LARGE: "error too large",
 }
 FOLLOWING = (ControllerState.STATUS_TRACKING, ControllerState.STATUS_LIMITED)
 

@@ -23,12 +23,7 @@ from snake_control.control.scp_controller import ScpController
 from snake_control.errors import ModelError, SingularError
 from snake_control.model.rotation import unwrap_near
 from snake_control.nodes import markers, topics
-from snake_control.nodes.controller_messages import (
-    Step,
-    controller_state,
-    judge,
-    velocity_command,
-)
+from snake_control.nodes.controller_messages import ControllerMessages, Step, judge, too_far
 from snake_control.nodes.conversions import head_motion, joint_motion, reference_from
 from snake_control.nodes.inputs import Fault, Input
 from snake_control.nodes.parameters import NodeParameters
@@ -56,6 +51,7 @@ class ScpControllerNode(Node):
         self._controller = ScpController(config.robot, config.controller)
         self._enabled = own.enabled
         self._status: int | None = None
+        self._messages = ControllerMessages(config.robot, own.frame_id)
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._origin_ns = self._steady.now().nanoseconds
         # Roll, pitch and yaw go on without jumps by whole turns.
@@ -109,11 +105,9 @@ class ScpControllerNode(Node):
     def _on_timer(self) -> None:
         started = time.perf_counter()
         step = self._step(self.get_clock().now().nanoseconds)
-        self._command.publish(velocity_command(step, self._robot))
+        self._command.publish(self._messages.command(step))
         elapsed = time.perf_counter() - started
-        self._state.publish(
-            controller_state(step, self._robot, self._case, self._own.frame_id, elapsed)
-        )
+        self._state.publish(self._messages.state(step, self._case, elapsed))
         if step.status != self._status:
             self._status = step.status
             # On lines of their own: rclpy ties one severity to each line that logs.
@@ -153,6 +147,11 @@ class ScpControllerNode(Node):
         elif problems:
             step.status = _STATUS_OF_FAULT[max(problem.fault for problem in problems)]
             step.text = "; ".join(problem.text for problem in problems)
+        elif text := too_far(
+            step, self._own.max_position_error_m, self._own.max_rotation_error_rad
+        ):
+            step.status = ControllerState.STATUS_ERROR_TOO_LARGE
+            step.text = text
         else:
             self._control(step, np.concatenate([w_dot, phi_dot]))
         return step
@@ -195,7 +194,7 @@ class ScpControllerNode(Node):
     def close(self) -> None:
         """Leave the joints with a command to rest."""
         now = self.get_clock().now().nanoseconds
-        self._command.publish(velocity_command(Step.at(now, self._robot), self._robot))
+        self._command.publish(self._messages.command(Step.at(now, self._robot)))
 
 
 def main() -> int:

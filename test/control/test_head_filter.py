@@ -9,13 +9,13 @@ from hypothesis import strategies as st
 from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
 
+from snake_control.control import head_filter
 from snake_control.control.head_filter import (
     HeadEstimate,
     HeadFilter,
     Reason,
     Rejection,
     gains,
-    noise_gain,
 )
 
 CUTOFF_HZ = 3.0
@@ -89,17 +89,15 @@ def test_noise_falls_as_documented():
         rng.normal(0.0, sigma_position, (count, 3)),
         [Rotation.from_rotvec(v) for v in rng.normal(0.0, sigma_rotation, (count, 3))],
     )[500:]
-    gain = noise_gain(CUTOFF_HZ, 100.0)
-    assert gain.pose == pytest.approx(0.30, abs=0.005)
-    assert gain.rate == pytest.approx(1.05, abs=0.005)
+    pose_gain, rate_gain = 0.30, 1.05
     position = np.std([e.position for e in estimates])
     velocity = np.std([e.velocity for e in estimates])
     rotation = np.std([e.rotation.as_rotvec() for e in estimates])
     angular_velocity = np.std([e.angular_velocity for e in estimates])
-    assert position == pytest.approx(gain.pose * sigma_position, rel=0.05)
-    assert velocity == pytest.approx(gain.rate * sigma_position, rel=0.05)
-    assert rotation == pytest.approx(gain.pose * sigma_rotation, rel=0.05)
-    assert angular_velocity == pytest.approx(gain.rate * sigma_rotation, rel=0.05)
+    assert position == pytest.approx(pose_gain * sigma_position, rel=0.05)
+    assert velocity == pytest.approx(rate_gain * sigma_position, rel=0.05)
+    assert rotation == pytest.approx(pose_gain * sigma_rotation, rel=0.05)
+    assert angular_velocity == pytest.approx(rate_gain * sigma_rotation, rel=0.05)
 
 
 def moving_filter():
@@ -114,6 +112,8 @@ def moving_filter():
     ("position", "quaternion", "step_ns", "reason"),
     [
         ((math.nan, 0, 0), LEVEL, STEP_NS, Reason.NOT_FINITE),
+        ((0, -1.7e308, 0), LEVEL, STEP_NS, Reason.TOO_FAR),
+        ((0, 0, 1001.0), LEVEL, STEP_NS, Reason.TOO_FAR),
         ((0, math.inf, 0), LEVEL, STEP_NS, Reason.NOT_FINITE),
         ((0, 0, 0), (0, 0, math.nan, 1), STEP_NS, Reason.NOT_FINITE),
         ((0, 0, 0), (0, 0, 0, 0), STEP_NS, Reason.NOT_A_ROTATION),
@@ -129,6 +129,17 @@ def test_a_bad_pose_is_rejected_and_changes_nothing(position, quaternion, step_n
     assert isinstance(result, Rejection)
     assert result.reason is reason
     assert filter_.estimate is before
+
+
+def test_an_estimate_that_is_no_number_is_forgotten(monkeypatch):
+    monkeypatch.setattr(head_filter, "MAX_DISTANCE_M", math.inf)
+    filter_ = HeadFilter(CUTOFF_HZ, TIMEOUT_S)
+    with np.errstate(over="ignore", invalid="ignore"):
+        filter_.update(0, (1.7e308, 0, 0), LEVEL)
+        result = filter_.update(STEP_NS, (-1.7e308, 0, 0), LEVEL)
+    assert isinstance(result, Rejection)
+    assert result.reason is Reason.NOT_FINITE
+    assert isinstance(filter_.update(2 * STEP_NS, (1.0, 0, 0), LEVEL), HeadEstimate)
 
 
 def test_almost_unit_quaternions_are_normalised():

@@ -107,6 +107,7 @@ def test_velocity_is_in_the_frame_of_the_head(mocap):
     [
         ({"position": (math.nan, 0, 0)}, "not finite"),
         ({"rotation": (0, 0, math.nan, 1)}, "not finite"),
+        ({"position": (1.7e308, 0, 0)}, "beyond 1000 m"),
         ({"rotation": (0, 0, 0, 0)}, "quaternion has length 0"),
         ({"rotation": (0, 0, 0, 2)}, "quaternion has length 2"),
     ],

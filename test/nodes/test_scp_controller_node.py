@@ -7,10 +7,11 @@ import pytest
 from snake_interfaces.msg import ControllerState
 from std_srvs.srv import SetBool
 
+from snake_control.control.reference import Reference
 from snake_control.control.scp_controller import ScpController
 from snake_control.model.floor import head_pose_on_floor
 from snake_control.nodes import topics
-from snake_control.nodes.conversions import stamp_ns
+from snake_control.nodes.conversions import pose_message, reference_message, stamp_ns
 from support.clock import SettableClock
 from support.controller_rig import GOOD, ControllerRig
 from support.graph import CONFIG, Graph
@@ -153,6 +154,40 @@ def test_a_bad_input_stops_the_joints_and_is_named(rig, spoil, texts):
     rig.wait_status(*GOOD, what="tracking after the repair")
 
 
+def far_reference(rig):
+    rig.reference.pose.position.x += 1.0
+
+
+def millimetres(rig):
+    rig.head.pose.pose.position.x = 300.0
+
+
+def turned_reference(rig):
+    w_d = rig.table_1.w_d.copy()
+    w_d[5] += 2.8
+    rig.reference.pose = pose_message(w_d)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "texts"),
+    [
+        (far_reference, ["m from its reference", "limit max_position_error_m = 0.3"]),
+        (millimetres, ["300 m from its reference"]),
+        (turned_reference, ["yaw", "2.8 rad", "limit max_rotation_error_rad = 2.5"]),
+    ],
+)
+def test_a_head_far_from_its_reference_does_not_lunge_after_it(rig, spoil, texts):
+    spoil(rig)
+    state = rig.wait_status(
+        ControllerState.STATUS_ERROR_TOO_LARGE, what=f"{spoil.__name__} noticed", texts=texts
+    )
+    assert is_zero(rig.command_of(state))
+    np.testing.assert_allclose(state.error[:3], np.subtract(state.w, state.w_d)[:3], atol=1e-12)
+    assert math.isnan(state.v_h)
+    rig.repair()
+    rig.wait_status(*GOOD, what="tracking after the repair")
+
+
 def test_enable_service(rig):
     response = rig.graph.call(NODE, topics.ENABLE, SetBool.Request(data=False))
     assert response.success
@@ -169,6 +204,8 @@ def test_a_straight_robot_is_singular_and_gets_no_motion(rig):
         rig.phi = np.zeros(len(phi))
         rig.w = head_pose_on_floor(rig.config.robot, rig.phi, np.zeros(3))
         rig.repair()
+        at_the_head = Reference(rig.w, rig.table_1.w_d_dot)
+        rig.reference = reference_message(at_the_head, 0, "world")
         state = rig.wait_status(ControllerState.STATUS_FAULT, what="the singular posture")
     finally:
         rig.w, rig.phi = w, phi
