@@ -41,8 +41,8 @@ class Sensor:
         ticks = units.ticks_from_angle(math.remainder(angle_rad, 2 * math.pi))
         return min(max(round(ticks), 0), units.MAX_TICKS)
 
-    def speed(self, speed_rad_s: float) -> int:
-        """Reading of Present Speed; undefined in the dead zone and shortly after."""
+    def speed(self, speed_rad_s: float, unit_rad_s: float = units.SPEED_UNIT_RAD_S) -> int:
+        """Reading of Present Speed in its unit; undefined in the dead zone and shortly after."""
         if self._since_dead_zone_s < _SPEED_MEMORY_S:
             return int(self._rng.integers(*_GARBAGE_SPEED))
-        return units.signed_magnitude(speed_rad_s / units.SPEED_UNIT_RAD_S)
+        return units.signed_magnitude(speed_rad_s / unit_rad_s)

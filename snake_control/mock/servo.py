@@ -179,6 +179,11 @@ class Servo:
         self.baud_rate = 2_000_000 / (r["baud_rate"] + 1)
         self.return_delay_s = r["return_delay_time"] * 2e-6
         self.wheel_mode = r["cw_angle_limit"] == 0 == r["ccw_angle_limit"]
+        # The e-manual: in wheel mode a unit is about 0.1 % of the speed without load.
+        no_load = self.parameters.motor.no_load_speed_rad_s
+        self._speed_unit_rad_s = (
+            no_load / units.OUTPUT_STEPS if self.wheel_mode else units.SPEED_UNIT_RAD_S
+        )
         self._voltage_limits_v = r["min_voltage_limit"] / 10, r["max_voltage_limit"] / 10
         self._temperature_limit_c = float(r["temperature_limit"])
         self._torque_limit = r["torque_limit"] / units.OUTPUT_STEPS
@@ -235,7 +240,7 @@ class Servo:
         """Fill the Present registers and Moving."""
         r, motion, sensor = self.registers, self.motion, self._sensor
         r["present_position"] = sensor.position(motion.angle_rad)
-        r["present_speed"] = sensor.speed(motion.speed_rad_s)
+        r["present_speed"] = sensor.speed(motion.speed_rad_s, self._speed_unit_rad_s)
         r["present_load"] = units.signed_magnitude(motion.output * units.OUTPUT_STEPS)
         r["present_voltage"] = min(max(round(self.supply_voltage_v * 10), 0), 255)
         r["present_temperature"] = min(max(round(self.health.temperature_c), 0), 255)

@@ -87,6 +87,20 @@ def test_speed_and_load_carry_the_direction_in_bit_10(goal, direction_bit):
     assert 0 < load & 1023 < 1023
 
 
+@pytest.mark.parametrize(("command", "direction_bit"), [(900, 0), (900 | 1024, 1024)])
+def test_in_wheel_mode_speed_counts_in_shares_of_the_speed_without_load(command, direction_bit):
+    servo = Servo(1, eeprom={"cw_angle_limit": 0, "ccw_angle_limit": 0})
+    servo.store("moving_speed", command)
+    for _ in range(200):
+        servo.step(0.005)
+    servo.motion.angle_rad = 0.0
+    servo.step(0.1)
+    servo.motion.angle_rad = 0.0
+    share = servo.motion.speed_rad_s / servo.parameters.motor.no_load_speed_rad_s
+
+    assert telemetry(servo)[1] == round(abs(share) * 1023) | direction_bit
+
+
 def test_load_is_the_output_and_not_the_torque():
     servo = Servo(1)
     for name, value in (("torque_enable", 1), ("goal_position", 512)):
