@@ -86,8 +86,25 @@ def disarm(bus: Bus, joints: Sequence[JointSetup]) -> None:
         bus.sync_write(ct.TORQUE_ENABLE.address, {joint.servo_id: b"\x00" for joint in joints})
 
 
+def disarm_confirmed(bus: Bus, joints: Sequence[JointSetup]) -> tuple[bool | None, ...]:
+    """Disarm; return what ``read_torque`` finds for each joint afterwards."""
+    disarm(bus, joints)
+    return tuple(read_torque(bus, joint) for joint in joints)
+
+
+def require_off(joints: Sequence[JointSetup], torque: Sequence[bool | None]) -> None:
+    """Check what ``disarm_confirmed`` returned.
+
+    Raises:
+        ServoError: torque is on, or not known to be off; names the servos.
+    """
+    unsure = [joint for joint, on in zip(joints, torque, strict=True) if on is not False]
+    if unsure:
+        raise ServoError([f"{joint}: torque off is not confirmed" for joint in unsure])
+
+
 def read_torque(bus: Bus, joint: JointSetup, retries: int | None = None) -> bool | None:
-    """Return whether Torque Enable is set; ``None`` if the servo did not answer."""
+    """Return whether Torque Enable is set, ``None`` if the servo did not answer."""
     # One byte is never read alone: an error status without data could pass for it.
     reply = bus.read(joint.servo_id, _RAM, 2, retries)
     return None if reply is None else ct.TORQUE_ENABLE.decode(reply.data, _RAM) != 0

@@ -71,6 +71,7 @@ class Bus:
     def reset_counters(self) -> None:
         """Begin counting anew."""
         self.counters.clear()
+        self.echoes = 0
 
     def close(self) -> None:
         """Close the port."""

@@ -12,7 +12,13 @@ import math
 from collections.abc import Callable, Sequence
 
 from snake_control.ax12 import control_table as ct
-from snake_control.ax12.arming import arm, check_armed, disarm, read_torque
+from snake_control.ax12.arming import (
+    arm,
+    check_armed,
+    disarm_confirmed,
+    read_torque,
+    require_off,
+)
 from snake_control.ax12.bus import Bus, Counters
 from snake_control.ax12.feedback import Feedback
 from snake_control.ax12.joint import WHEEL_MODE, JointSetup
@@ -192,22 +198,19 @@ class ServoChain:
         Raises:
             ServoError: it was sent to all, but some servos did not confirm it.
         """
-        disarm(self._bus, self.joints)
+        found = disarm_confirmed(self._bus, self.joints)
         self._armed = False
-        unsure = self.look_for_torque()
-        if unsure:
-            raise ServoError([f"{joint}: torque off is not confirmed" for joint in unsure])
+        self._note_torque(found)
+        require_off(self.joints, found)
 
-    def look_for_torque(self) -> tuple[JointSetup, ...]:
-        """Read Torque Enable of all servos; return the joints with torque, or without answer."""
-        unsure = []
-        for servo in self._servos:
-            found = read_torque(self._bus, servo.joint)
-            if found is not None:
-                servo.torque_on = found
-            if found is None or found:
-                unsure.append(servo.joint)
-        return tuple(unsure)
+    def look_for_torque(self) -> None:
+        """Read from all servos whether torque is on; one that does not answer keeps its state."""
+        self._note_torque([read_torque(self._bus, servo.joint) for servo in self._servos])
+
+    def _note_torque(self, found: Sequence[bool | None]) -> None:
+        for servo, on in zip(self._servos, found, strict=True):
+            if on is not None:
+                servo.torque_on = on
 
     def write(self, velocities: Sequence[float] | None) -> None:
         """Send one cycle's goals and speeds.

@@ -2,7 +2,8 @@
 
 Lifecycle: configure opens the port and checks every servo, activate seeds and arms them, deactivate
 lets them hold, cleanup closes the port. With ``autostart`` (default) configure and activate happen
-at start, and a failure ends the process with one message.
+in the first turns of the executor, so that a signal comes between them, and a failure ends the
+process with one message.
 """
 
 from __future__ import annotations
@@ -11,8 +12,7 @@ import sys
 import time
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray
-from rclpy.duration import Duration
+from rclpy.clock import Clock, ClockType
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from snake_interfaces.msg import JointVelocityCommand
 from std_srvs.srv import SetBool, Trigger
@@ -26,6 +26,8 @@ from snake_control.nodes.bus_messages import (
     StateMessages,
     checked_velocities,
     diagnostics,
+    no_diagnostics,
+    time_message,
 )
 from snake_control.nodes.bus_snapshot import Snapshot
 from snake_control.nodes.parameters import NodeParameters
@@ -35,17 +37,18 @@ _THREAD_SWITCH_S = 5e-4
 """A callback may keep the bus thread waiting for the interpreter this long (default 5 ms)."""
 
 _LOG_PERIOD_S = 1.0
+_CHECK_PERIOD_S = 0.2
+_NS = 1_000_000_000
 
 
 class BusDriver(LifecycleNode):
     """The driver as a lifecycle node."""
 
     def __init__(self, **overrides: Any) -> None:
-        """Declare parameters, topics and services; with ``autostart``, configure and activate.
+        """Declare parameters, topics and services; with ``autostart``, the executor starts it.
 
         Raises:
             ConfigError: a parameter.
-            BusError, ServoError: autostart failed; no servo was armed.
         """
         super().__init__("bus_driver", **overrides)
         self._config = NodeParameters(self, "bus_driver").config
@@ -54,7 +57,8 @@ class BusDriver(LifecycleNode):
         self._last: Snapshot | None = None
         self._health = HealthLog()
         self._failure: SnakeError | None = None
-        self._starting = False
+        self._starting = driver.autostart
+        self._joint_stamp_ns = 0
         self._ignored = 0
         self._ignored_logged_at = 0.0
         self._joint_states = self._publisher(topics.JOINT_STATES)
@@ -69,9 +73,13 @@ class BusDriver(LifecycleNode):
         self._serve(topics.RECOVER, self._recover)
         self._serve(topics.EMERGENCY_STOP, self._emergency_stop)
         self._serve(topics.RESET_EMERGENCY_STOP, self._reset_emergency_stop)
-        self.create_timer(driver.diagnostics_period_s, self._publish_diagnostics)
+        # Not by the node's clock: with use_sim_time it may stand still.
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self.create_timer(driver.diagnostics_period_s, self._publish_diagnostics, clock=steady)
+        self.create_timer(_CHECK_PERIOD_S, self._loop.check, clock=steady)
         if driver.autostart:
-            self._autostart()
+            self._steps = iter((self.trigger_configure, self.trigger_activate))
+            self._starter = self.create_timer(0.0, self._start_step, clock=steady)
 
     def close(self) -> None:
         """Hold, switch torque off if configured, close the port."""
@@ -98,11 +106,13 @@ class BusDriver(LifecycleNode):
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Close the port."""
         self._loop.close()
+        self._last = None
         return TransitionCallbackReturn.SUCCESS
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Hold and close the port."""
         self._loop.close()
+        self._last = None
         return TransitionCallbackReturn.SUCCESS
 
     def _attempt(self, action) -> TransitionCallbackReturn:  # type: ignore[no-untyped-def]
@@ -115,13 +125,20 @@ class BusDriver(LifecycleNode):
             return TransitionCallbackReturn.FAILURE
         return TransitionCallbackReturn.SUCCESS
 
-    def _autostart(self) -> None:
-        self._starting = True
-        for transition in (self.trigger_configure, self.trigger_activate):
-            if transition() != TransitionCallbackReturn.SUCCESS:
-                self._loop.close()
+    def _start_step(self) -> None:
+        """Configure at the first call, activate at the second.
+
+        Raises:
+            BusError, ServoError: it failed; no servo was armed.
+        """
+        step = next(self._steps, None)
+        if step is not None:
+            if step() != TransitionCallbackReturn.SUCCESS:
+                self._starter.cancel()
                 assert self._failure is not None
                 raise self._failure
+            return
+        self._starter.cancel()
         self._starting = False
         self.get_logger().info(
             f"{len(self._config.servos.ids)} servos on {self._config.bus_driver.port}, torque "
@@ -135,7 +152,7 @@ class BusDriver(LifecycleNode):
             velocities, age = checked_velocities(
                 message,
                 self._config.robot.joint_names,
-                self.get_clock().now(),
+                self.get_clock().now().nanoseconds,
                 self._config.bus_driver.command_timeout_s,
             )
         except InvalidCommandError as error:
@@ -155,20 +172,26 @@ class BusDriver(LifecycleNode):
 
     def _publish(self, snapshot: Snapshot) -> None:
         """Publish one cycle; called by the bus thread, which has nothing else to do now."""
-        since = Duration(nanoseconds=int(1e9 * (time.monotonic() - snapshot.read_at)))
-        stamp = (self.get_clock().now() - since).to_msg()
-        oldest = max((reading.age for reading in snapshot.readings), default=float("inf"))
-        if oldest <= self._config.bus_driver.feedback_timeout_s:
-            self._joint_states.publish(self._messages.joint_state(snapshot, stamp))
-        self._bus_state.publish(self._messages.bus_state(snapshot, stamp))
+        now, now_ns = time.monotonic(), self.get_clock().now().nanoseconds
         self._last = snapshot
+        age = now - snapshot.oldest_at
+        if age <= self._config.bus_driver.feedback_timeout_s:
+            stamp_ns = now_ns - round(_NS * age)
+            # A servo that missed its turn makes two messages with one oldest reading.
+            if 0 <= self._joint_stamp_ns - stamp_ns < _NS:
+                stamp_ns = self._joint_stamp_ns + 1
+            self._joint_stamp_ns = stamp_ns
+            stamp = time_message(stamp_ns)
+            self._joint_states.publish(self._messages.joint_state(snapshot, stamp))
+        stamp = time_message(now_ns - round(_NS * max(0.0, now - snapshot.read_at)))
+        self._bus_state.publish(self._messages.bus_state(snapshot, stamp))
 
     def _publish_diagnostics(self) -> None:
-        self._loop.check()
-        snapshot = self._last
+        snapshot, driver = self._last, self._config.bus_driver
+        stamp = time_message(self.get_clock().now().nanoseconds)
         if snapshot is None:
+            self._diagnostics.publish(no_diagnostics(driver.port, stamp))
             return
-        driver = self._config.bus_driver
         thresholds = Thresholds(
             driver.temperature_warn_c,
             driver.voltage_low_warn_v,
@@ -177,10 +200,7 @@ class BusDriver(LifecycleNode):
         )
         verdicts = [judge(reading, thresholds) for reading in snapshot.readings]
         self._log_changes(snapshot, verdicts)
-        message: DiagnosticArray = diagnostics(
-            snapshot, verdicts, driver.port, self.get_clock().now().to_msg()
-        )
-        self._diagnostics.publish(message)
+        self._diagnostics.publish(diagnostics(snapshot, verdicts, driver.port, stamp))
 
     def _log_changes(self, snapshot: Snapshot, verdicts: list[Verdict]) -> None:
         log = self.get_logger()
@@ -199,7 +219,7 @@ class BusDriver(LifecycleNode):
         return self._answer(response, lambda: self._loop.set_torque(request.data), done)
 
     def _recover(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        return self._answer(response, self._loop.recover, "all servos answer and hold")
+        return self._answer(response, self._loop.recover, "all servos answer")
 
     def _emergency_stop(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         return self._answer(response, self._loop.emergency_stop, "holding until reset")
@@ -207,7 +227,8 @@ class BusDriver(LifecycleNode):
     def _reset_emergency_stop(
         self, _: Trigger.Request, response: Trigger.Response
     ) -> Trigger.Response:
-        return self._answer(response, self._loop.reset_emergency_stop, "commands are taken again")
+        done = "commands are taken again, from a zero command on"
+        return self._answer(response, self._loop.reset_emergency_stop, done)
 
     def _answer(self, response, action, done: str):  # type: ignore[no-untyped-def]
         try:

@@ -6,21 +6,22 @@ thread carries out between two cycles.
 
 from __future__ import annotations
 
-import dataclasses
 import math
-import queue
 import threading
 import time
-from collections.abc import Callable, Sequence
-from concurrent.futures import Future
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 
+from snake_control.ax12.arming import disarm_confirmed, require_off
 from snake_control.ax12.bus import Bus
 from snake_control.ax12.chain import Motion, ServoChain
-from snake_control.ax12.joint import joint_setups
+from snake_control.ax12.joint import JointSetup, joint_setups
 from snake_control.ax12.port import SerialPort
 from snake_control.ax12.startup import cycle_duration, handshake
 from snake_control.config import Config
 from snake_control.errors import BusError, ServoError, SnakeError
+from snake_control.nodes.bus_command import CommandBuffer
+from snake_control.nodes.bus_requests import RefusedError, Requests
 from snake_control.nodes.bus_schedule import Schedule
 from snake_control.nodes.bus_snapshot import Snapshot, State
 
@@ -32,15 +33,15 @@ _REQUEST_TIMEOUT_S = 10.0
 _HOLD_BURST = 5
 """Cycles of hold before the driver lets go: SYNC_WRITE is not acknowledged."""
 
-
-@dataclasses.dataclass(frozen=True)
-class _Command:
-    velocities: tuple[float, ...]
-    computed_at: float
-
-
-class RefusedError(SnakeError, RuntimeError):
-    """A request that does not fit the state of the driver."""
+_PUBLISH_FAILURES = (
+    ArithmeticError,
+    AssertionError,
+    LookupError,
+    RuntimeError,  # of which rcl's own errors are
+    TypeError,
+    ValueError,
+)
+_LOG_PERIOD_S = 1.0
 
 
 class BusLoop:
@@ -67,18 +68,17 @@ class BusLoop:
         self._error = error
         self._period = 1.0 / self._driver.rate_hz
         self._schedule = Schedule(self._period)
-        self._requests: queue.SimpleQueue[tuple[Callable[[], None], Future[None]]] = (
-            queue.SimpleQueue()
-        )
-        self._command: _Command | None = None
+        self._requests = Requests()
+        self._commands = CommandBuffer(self._driver.command_timeout_s)
         self._emergency = False
         self._stopping = False
         self._thread: threading.Thread | None = None
         self._bus: Bus | None = None
         self._chain: ServoChain | None = None
         self._active = False
+        self._torque_wanted = False
         self._fault = ""
-        self._refused: tuple[float, str] = (-math.inf, "")
+        self._publish_logged_at = -_LOG_PERIOD_S
 
     # For any thread.
 
@@ -89,8 +89,13 @@ class BusLoop:
             BusError: the port cannot be opened.
             ServoError: everything that is missing or wrong on the bus. Nothing was written.
         """
-        self._connect()
+        try:
+            self._connect()
+        except SnakeError:
+            self._close_port()
+            raise
         self._stopping = False
+        self._requests = Requests()
         self._thread = threading.Thread(target=self._run, name="bus", daemon=True)
         self._thread.start()
 
@@ -100,9 +105,7 @@ class BusLoop:
             self._stopping = True
             self._thread.join()
             self._thread = None
-        if self._bus is not None:
-            self._bus.close()
-        self._bus = self._chain = None
+        self._close_port()
 
     def check(self) -> None:
         """Raise ``RefusedError`` if the thread ended by itself, which it must not."""
@@ -111,20 +114,21 @@ class BusLoop:
 
     def command(self, velocities: Sequence[float], age: float) -> None:
         """Take joint velocities [rad/s] that were computed ``age`` seconds ago."""
-        self._command = _Command(tuple(velocities), time.monotonic() - age)
+        self._commands.take(velocities, age, time.monotonic())
 
     def refuse_command(self, why: str) -> None:
         """Say in the coming states that a command was not taken."""
-        self._refused = (time.monotonic(), why)
+        self._commands.refuse(why, time.monotonic())
 
     def emergency_stop(self) -> None:
         """Hold from the next cycle on and take no command until reset."""
         self._emergency = True
-        self._command = None
+        self._commands.clear()
 
     def reset_emergency_stop(self) -> None:
-        """Take commands again, new ones."""
-        self._command = None
+        """Take commands again, from the next one on that is zero."""
+        if self._emergency:
+            self._commands.wait_for_zero(time.monotonic())
         self._emergency = False
 
     def activate(self) -> None:
@@ -132,7 +136,7 @@ class BusLoop:
 
         Raises:
             BusError: the port failed.
-            ServoError: a servo refused; no torque is on.
+            ServoError: a servo refused; no torque was switched on.
         """
         self._request(self._activate)
 
@@ -145,15 +149,20 @@ class BusLoop:
 
         Raises:
             RefusedError: not in this state.
-            BusError, ServoError: as ``activate``.
+            BusError: the port failed.
+            ServoError: a servo refused torque, and none was switched on; or torque off was sent to
+                all, but the servos named did not confirm it.
         """
         self._request(self._torque_on if on else self._torque_off)
 
     def recover(self) -> None:
-        """Open the port anew if it failed, check and arm all servos, forget the fault.
+        """Open the port anew if it failed, check all servos, forget the fault.
+
+        They are armed unless torque was switched off on purpose.
 
         Raises:
-            RefusedError, BusError, ServoError: as ``set_torque``; the fault stays.
+            RefusedError: not in this state.
+            BusError, ServoError: the fault stays; no torque was switched on, and none off.
         """
         self._request(self._recover)
 
@@ -162,37 +171,23 @@ class BusLoop:
     def _request(self, action: Callable[[], None]) -> None:
         if self._thread is None:
             raise RefusedError("the driver is not configured")
-        future: Future[None] = Future()
-        self._requests.put((action, future))
-        try:
-            future.result(_REQUEST_TIMEOUT_S)
-        except TimeoutError as error:
-            raise RefusedError(f"not carried out within {_REQUEST_TIMEOUT_S:g} s") from error
+        self._requests.carry_out(action, _REQUEST_TIMEOUT_S)
 
     def _run(self) -> None:
-        self._schedule.start(time.monotonic())
-        while not self._stopping:
-            self._serve_requests()
-            self._schedule.begin(time.monotonic())
-            self._cycle()
-            time.sleep(self._schedule.end(time.monotonic()))
-        self._serve_requests()
-        self._let_go()
-
-    def _serve_requests(self) -> None:
-        served = False
-        while not self._requests.empty():
-            action, future = self._requests.get()
-            try:
-                action()
-            except SnakeError as error:
-                future.set_exception(error)
-            else:
-                future.set_result(None)
-            served = True
-        if served:
-            # The time a request took is no lateness of the cycle.
+        try:
             self._schedule.start(time.monotonic())
+            while not self._stopping:
+                if self._requests.serve():
+                    # The time a request took is no lateness of the cycle.
+                    self._schedule.start(time.monotonic())
+                self._schedule.begin(time.monotonic())
+                self._cycle()
+                time.sleep(self._schedule.end(time.monotonic()))
+        finally:
+            try:
+                self._let_go()
+            finally:
+                self._requests.end()
 
     def _cycle(self) -> None:
         begin = read_begin = time.monotonic()
@@ -208,26 +203,30 @@ class BusLoop:
             self._look_for_faults()
         end = time.monotonic()
         chain = self._chain
-        self._publish(
-            Snapshot(
-                state=state,
-                text=text,
-                read_at=0.5 * (read_begin + end),
-                readings=tuple(chain.readings()) if chain is not None else (),
-                armed=chain is not None and chain.armed,
-                cycle_time=end - begin,
-                cycle_rate=self._schedule.rate,
-                command_age=self._command_age(begin),
-                cycles=self._schedule.cycles,
-                late_cycles=self._schedule.late_cycles,
-            )
+        readings = tuple(chain.readings()) if chain is not None else ()
+        snapshot = Snapshot(
+            state=state,
+            text=text,
+            read_at=0.5 * (read_begin + end),
+            oldest_at=end - max((reading.age for reading in readings), default=math.inf),
+            readings=readings,
+            cycle_time=end - begin,
+            cycle_rate=self._schedule.rate,
+            command_age=self._commands.age(begin),
+            cycles=self._schedule.cycles,
+            late_cycles=self._schedule.late_cycles,
         )
+        try:
+            self._publish(snapshot)
+        except _PUBLISH_FAILURES as error:
+            # The joints must go on being led whoever may hear of it.
+            if end - self._publish_logged_at >= _LOG_PERIOD_S:
+                self._publish_logged_at = end
+                self._error(f"the state cannot be published: {error!r}")
 
     def _decide(self, now: float) -> tuple[State, str, tuple[float, ...] | None]:
         """State, text and velocities (None: hold) of this cycle."""
         state, text, velocities = State.HOLDING, "", None
-        timeout = self._driver.command_timeout_s
-        command = self._command
         if not self._active:
             state, text = State.INACTIVE, self._fault or "not activated"
         elif self._emergency:
@@ -236,21 +235,21 @@ class BusLoop:
         elif self._fault:
             state, text = State.STOPPED, f"{self._fault}; needs ~/recover"
         elif self._chain is None or not self._chain.armed:
-            state, text = State.TORQUE_OFF, "torque is off"
-        elif command is None:
-            text = "holding: no command yet"
-        elif now - command.computed_at > timeout:
-            text = f"holding: no command for {timeout:.2f} s"
+            state, text = self._not_armed(() if self._chain is None else self._chain.torque_on)
         else:
-            state, text, velocities = State.MOVING, "moving", command.velocities
-        refused_at, why = self._refused
-        if now - refused_at < 1.0:
-            text += f"; command ignored: {why}"
-        return state, text, velocities
+            velocities, text = self._commands.newest(now)
+            if velocities is not None:
+                state = State.MOVING
+        return state, text + self._commands.refusal(now), velocities
 
-    def _command_age(self, now: float) -> float:
-        command = self._command
-        return math.inf if command is None else now - command.computed_at
+    def _not_armed(self, torque_on: Sequence[JointSetup]) -> tuple[State, str]:
+        if not torque_on:
+            return State.TORQUE_OFF, "torque is off"
+        holds = len(torque_on) == len(self._joints)
+        return (
+            State.HOLDING if holds else State.TORQUE_OFF,
+            f"torque is still on at {_named(torque_on)}; no command is taken before ~/set_torque",
+        )
 
     def _look_for_faults(self) -> None:
         if self._chain is None or self._fault or not self._active:
@@ -261,25 +260,58 @@ class BusLoop:
 
     def _stop(self, why: str) -> None:
         self._fault = why
-        self._command = None
+        self._commands.clear()
         self._error(f"stopped: {why}; the other joints hold; call ~/recover when it is put right")
 
     def _lose_port(self, error: BusError) -> None:
+        self._close_port()
+        self._stop(str(error))
+
+    @contextmanager
+    def _watching_the_port(self) -> Iterator[None]:
+        try:
+            yield
+        except BusError as error:
+            if self._active:
+                self._lose_port(error)
+            else:
+                self._close_port()
+                self._fault = str(error)
+            raise
+
+    def _close_port(self) -> None:
         if self._bus is not None:
             self._bus.close()
         self._bus = self._chain = None
-        self._stop(str(error))
 
     def _connect(self) -> None:
+        """Open the port unless it is open, and check all servos.
+
+        Raises:
+            ServoError: the port stays open, and what was known of the servos stays.
+            BusError: the port is closed.
+        """
         driver = self._driver
-        port = SerialPort(driver.port, driver.baud_rate, driver.reply_timeout_s)
-        try:
-            bus = Bus(port, driver.retries)
+        warnings: list[str] = []
+        if self._bus is None:
+            port = SerialPort(driver.port, driver.baud_rate, driver.reply_timeout_s)
+            warnings += port.warnings
+            self._bus = Bus(port, driver.retries)
+        bus = self._bus
+        bus.reset_counters()
+        motion = Motion(
+            self._period,
+            driver.look_ahead_s,
+            driver.acceleration_limit_rad_s2,
+            driver.lost_after_misses,
+        )
+        with self._watching_the_port():
             found = handshake(bus, self._joints, self._models)
-        except SnakeError:
-            port.close()
-            raise
-        for text in (*port.warnings, *found.warnings):
+            chain = ServoChain(bus, self._joints, found.servos, motion, time.monotonic)
+            chain.look_for_torque()
+        bus.reset_counters()
+        self._chain = chain
+        for text in (*warnings, *found.warnings):
             self._warn(text)
         shortest = cycle_duration(found.servos, driver.baud_rate)
         if shortest > _READ_SHARE * self._period:
@@ -288,25 +320,19 @@ class BusLoop:
                 f"{driver.rate_hz:g}: not every servo is read in every cycle; lower Return Delay "
                 "Time or rate_hz, or raise the baud rate"
             )
-        bus.reset_counters()
-        motion = Motion(
-            self._period,
-            driver.look_ahead_s,
-            driver.acceleration_limit_rad_s2,
-            driver.lost_after_misses,
-        )
-        self._bus = bus
-        self._chain = ServoChain(bus, self._joints, found.servos, motion, time.monotonic)
 
     def _activate(self) -> None:
-        self._command = None
-        if self._bus is None or self._chain is None:
+        self._commands.clear()
+        if self._chain is None:
             self._connect()
         assert self._bus is not None
         assert self._chain is not None
         self._bus.reset_counters()
-        if self._driver.torque_on_activate:
+        self._torque_wanted = self._driver.torque_on_activate
+        if self._torque_wanted:
             self._arm(self._chain)
+        elif self._chain.torque_on:
+            self._warn(f"torque is on already at {_named(self._chain.torque_on)}")
         self._fault = ""
         self._schedule.reset_counts()
         self._active = True
@@ -314,54 +340,60 @@ class BusLoop:
     def _deactivate(self) -> None:
         self._burst_of_hold()
         self._active = False
-        self._command = None
+        self._commands.clear()
 
     def _torque_on(self) -> None:
-        if not self._active:
-            raise RefusedError("not active")
-        if self._emergency:
-            raise RefusedError("emergency stop: call ~/reset_emergency_stop first")
+        self._refuse_unless_ready()
         if self._fault or self._chain is None:
             raise RefusedError(f"stopped: {self._fault}; call ~/recover")
-        self._command = None
+        self._commands.clear()
+        self._torque_wanted = True
         self._arm(self._chain)
+        self._commands.wait_for_zero(time.monotonic())
 
     def _torque_off(self) -> None:
-        if self._chain is None:
+        self._commands.clear()
+        self._torque_wanted = False
+        if self._bus is None:
             raise RefusedError(self._fault or "the port is not open")
-        self._command = None
-        try:
-            self._chain.disarm()
-        except BusError as error:
-            self._lose_port(error)
-            raise
+        with self._watching_the_port():
+            self._disarm(self._bus)
 
     def _recover(self) -> None:
-        if not self._active:
-            raise RefusedError("not active")
-        self._command = None
-        if self._bus is not None:
-            self._bus.close()
-        self._bus = self._chain = None
+        self._refuse_unless_ready()
+        self._commands.clear()
         try:
             self._connect()
             assert self._chain is not None
-            self._arm(self._chain)
+            if self._torque_wanted:
+                self._arm(self._chain)
         except SnakeError as error:
             self._fault = f"recovery failed: {error}"
             raise
         self._fault = ""
+        self._commands.wait_for_zero(time.monotonic())
+
+    def _refuse_unless_ready(self) -> None:
+        if not self._active:
+            raise RefusedError("not active")
+        if self._emergency:
+            raise RefusedError("emergency stop: call ~/reset_emergency_stop first")
 
     def _arm(self, chain: ServoChain) -> None:
         try:
-            chain.arm()
-        except BusError as error:
-            self._lose_port(error)
-            raise
+            with self._watching_the_port():
+                chain.arm()
         except ServoError as error:
             if self._active:
                 self._fault = str(error)
             raise
+
+    def _disarm(self, bus: Bus) -> None:
+        # A recovery that failed may leave the port open and the servos unknown.
+        if self._chain is not None:
+            self._chain.disarm()
+        else:
+            require_off(self._joints, disarm_confirmed(bus, self._joints))
 
     def _burst_of_hold(self) -> None:
         if not self._active or self._chain is None or not self._chain.armed:
@@ -376,10 +408,16 @@ class BusLoop:
             self._lose_port(error)
 
     def _let_go(self) -> None:
-        self._burst_of_hold()
-        if self._driver.torque_off_on_exit and self._chain is not None and self._chain.armed:
-            try:
-                self._chain.disarm()
-            except BusError as error:
-                self._lose_port(error)
-        self._active = False
+        try:
+            self._burst_of_hold()
+        finally:
+            self._active = False
+            if self._driver.torque_off_on_exit and self._bus is not None:
+                try:
+                    self._disarm(self._bus)
+                except SnakeError as error:
+                    self._error(f"torque off at the end: {error}")
+
+
+def _named(joints: Sequence[JointSetup]) -> str:
+    return ", ".join(map(str, joints))

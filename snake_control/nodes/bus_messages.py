@@ -7,7 +7,6 @@ from collections.abc import Sequence
 
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from rclpy.time import Time as RosTime
 from sensor_msgs.msg import JointState
 from snake_interfaces.msg import BusState, JointVelocityCommand, ServoState
 
@@ -15,6 +14,8 @@ from snake_control.ax12.chain import JointReading
 from snake_control.ax12.health import Level, Verdict
 from snake_control.ax12.units import error_names
 from snake_control.nodes.bus_snapshot import Snapshot, State
+
+_NS = 1_000_000_000
 
 _STATE_LEVELS = {
     State.STOPPED: Level.ERROR,
@@ -57,17 +58,17 @@ class StateMessages:
         message.cycles = snapshot.cycles
         message.late_cycles = snapshot.late_cycles
         for servo, reading in zip(message.servos, snapshot.readings, strict=False):
-            _fill(servo, reading, snapshot.armed)
+            _fill(servo, reading)
         if not snapshot.readings:
             for servo in message.servos:
-                servo.online = servo.torque_enabled = False
+                servo.online = False
                 servo.age = math.inf
         return message
 
 
-def _fill(servo: ServoState, reading: JointReading, armed: bool) -> None:
+def _fill(servo: ServoState, reading: JointReading) -> None:
     servo.online = reading.online
-    servo.torque_enabled = armed
+    servo.torque_enabled = reading.torque_on
     servo.error_bits = reading.error_bits
     servo.position = reading.angle
     servo.velocity = reading.rate
@@ -80,6 +81,20 @@ def _fill(servo: ServoState, reading: JointReading, armed: bool) -> None:
     servo.misses = reading.counters.misses
     servo.corrupt_replies = reading.counters.corrupt_replies
     servo.invalid_values = reading.invalid_values
+
+
+def time_message(ns: int) -> Time:
+    """Return a stamp from nanoseconds; before the epoch there is none, so not before 0."""
+    sec, nanosec = divmod(max(0, ns), _NS)
+    return Time(sec=sec, nanosec=nanosec)
+
+
+def no_diagnostics(port: str, stamp: Time) -> DiagnosticArray:
+    """Return the one status of a driver that is not configured."""
+    array = DiagnosticArray()
+    array.header.stamp = stamp
+    array.status = [_status("bus_driver: bus", port, Level.STALE, "not configured", {})]
+    return array
 
 
 def diagnostics(
@@ -146,9 +161,9 @@ class InvalidCommandError(ValueError):
 
 
 def checked_velocities(
-    message: JointVelocityCommand, joint_names: Sequence[str], now: RosTime, timeout: float
+    message: JointVelocityCommand, joint_names: Sequence[str], now_ns: int, timeout: float
 ) -> tuple[tuple[float, ...], float]:
-    """Return the velocities in joint order [rad/s] and the command's age [s].
+    """Return the velocities in joint order [rad/s] and the command's age [s] at ``now_ns``.
 
     Raises:
         InvalidCommandError: names are not exactly the joints, lengths differ, a value is not
@@ -169,7 +184,9 @@ def checked_velocities(
     for name, value in values.items():
         if not math.isfinite(value):
             raise InvalidCommandError(f"velocity of {name} is {value}")
-    age = 1e-9 * (now - RosTime.from_msg(message.header.stamp, now.clock_type)).nanoseconds
+    # In plain numbers: rclpy's Time raises on stamps before the epoch.
+    stamp = message.header.stamp
+    age = (now_ns - (stamp.sec * _NS + stamp.nanosec)) / _NS
     if age > timeout:
         raise InvalidCommandError(f"its stamp is {age:.2f} s old, more than {timeout:.2f} s")
     if age < -timeout:

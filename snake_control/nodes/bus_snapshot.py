@@ -26,8 +26,8 @@ class Snapshot:
     Attributes:
         state, text: what is done with commands, and why.
         read_at: middle of the read cycle on the monotonic clock [s].
-        readings: one per joint.
-        armed: whether torque is on.
+        oldest_at: when the oldest of the readings was taken [s]; minus infinite without any.
+        readings: one per joint; none without a port.
         cycle_time: from the first byte to the last [s].
         cycle_rate: measured [Hz].
         command_age: [s], infinite without a command.
@@ -37,8 +37,8 @@ class Snapshot:
     state: State
     text: str
     read_at: float
+    oldest_at: float
     readings: tuple[JointReading, ...]
-    armed: bool
     cycle_time: float
     cycle_rate: float
     command_age: float

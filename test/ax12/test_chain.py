@@ -192,7 +192,7 @@ def test_torque_off_is_verified(chain: ServoChain, servos: ScriptedServos) -> No
 
 def test_torque_that_is_on_already_is_seen(chain: ServoChain, servos: ScriptedServos) -> None:
     servos.memory[2][24] = 1
-    assert [joint.servo_id for joint in chain.look_for_torque()] == [2]
+    chain.look_for_torque()
     assert [joint.servo_id for joint in chain.torque_on] == [2]
     assert not chain.armed
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import itertools
 import math
+import statistics
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -20,6 +22,7 @@ from snake_interfaces.msg import BusState
 
 from snake_control.nodes import topics
 from support.driven_robot import NAMES, DrivenRobot, stamp
+from support.scripted_servos import PING, SYNC_WRITE, WRITE, ScriptedServos
 
 UNIT = 0.111 * math.tau / 60.0
 TICK = math.radians(300.0 / 1023.0)
@@ -120,6 +123,11 @@ def test_without_commands_the_joints_hold_soon(robot: DrivenRobot) -> None:
     assert max(rest) - min(rest) <= 2 * TICK
 
 
+def ancient_age(robot: DrivenRobot) -> str:
+    """First digits of the time since the epoch."""
+    return str(robot.graph.node.get_clock().now().nanoseconds)[:6]
+
+
 def invalid_commands(robot: DrivenRobot) -> dict[str, Any]:
     good = dict.fromkeys(NAMES, 0.2)
     short = robot.message(good)
@@ -130,6 +138,8 @@ def invalid_commands(robot: DrivenRobot) -> dict[str, Any]:
     old.header.stamp.sec -= 1
     ahead = robot.message(good)
     ahead.header.stamp.sec += 1
+    ancient = robot.message(good)
+    ancient.header.stamp.sec = -1
     return {
         "missing: joint_11": robot.message(dict.fromkeys(NAMES[:-1], 0.2)),
         "no such joint: elbow": robot.message(good | {"elbow": 0.2}),
@@ -138,6 +148,7 @@ def invalid_commands(robot: DrivenRobot) -> dict[str, Any]:
         "11 names but 10 velocities": short,
         "a joint is named twice": twice,
         "its stamp is 1.": old,
+        f"its stamp is {ancient_age(robot)}": ancient,
         "ahead: are the clocks in step?": ahead,
     }
 
@@ -204,7 +215,14 @@ def test_an_emergency_stop_latches_until_reset(robot: DrivenRobot) -> None:
     assert not refused.success
     assert "reset_emergency_stop" in refused.message
     assert robot.call(topics.RESET_EMERGENCY_STOP).success
+    state = robot.wait_for_state(BusState.STATE_HOLDING)
+    assert state.text == "holding: waiting for a zero command"
+    robot.command()
     robot.wait_for_state(BusState.STATE_MOVING)
+    robot.command(joint_8=0.3)
+    robot.graph.wait_for(
+        lambda: joint(robot.truth.last, "joint_8") - begin > 0.05, 10.0, "joint_8 to move"
+    )
 
 
 def test_diagnostics_have_one_status_of_the_bus_and_one_of_each_servo(robot: DrivenRobot) -> None:
@@ -237,8 +255,42 @@ def test_a_lost_port_stops_and_recovers(tmp_path: Path) -> None:
             lambda: robot.call(topics.RECOVER).success, 20.0, "a recovery that succeeds"
         )
         robot.wait_for_state(BusState.STATE_HOLDING)
-        robot.command(joint_7=0.2)
+        robot.command()
         robot.wait_for_state(BusState.STATE_MOVING)
+
+
+@pytest.mark.parametrize("stop", ["interrupt", "terminate"])
+def test_a_signal_while_the_servos_are_checked_arms_none(tmp_path: Path, stop: str) -> None:
+    started = threading.Event()
+
+    def answer(instruction: bytes, answer: bytes) -> bytes:
+        if instruction[2] == 11 and instruction[4] == PING and started.wait(10.0):
+            getattr(robot.driver, stop)()
+        return answer
+
+    with ScriptedServos(range(1, 12)) as servos:
+        servos.answer = answer
+        own = {"port": servos.path}
+        with DrivenRobot(tmp_path, driver=own, with_mock=False) as robot:
+            started.set()
+            assert robot.driver.wait(30.0) == 0
+            assert len(servos.instructions(PING)) >= 11
+            assert servos.instructions(WRITE) == servos.instructions(SYNC_WRITE) == []
+            assert "Traceback" not in robot.driver.output()
+
+
+def test_a_driver_whose_clock_does_not_run_publishes_and_says_why_it_holds(
+    tmp_path: Path,
+) -> None:
+    with DrivenRobot(tmp_path, driver={"use_sim_time": True}) as robot:
+        robot.wait_for_state(BusState.STATE_HOLDING)
+        robot.command(joint_7=0.2)
+        robot.graph.wait_for(
+            lambda: "ahead: are the clocks in step?" in robot.bus_state.last.text,
+            10.0,
+            "the reason",
+        )
+        assert robot.driver.running
 
 
 @pytest.mark.parametrize("stop", ["interrupt", "terminate"])
@@ -297,13 +349,20 @@ def test_one_joint_in_wheel_mode(tmp_path: Path) -> None:
     modes = {"servos": {"velocity_modes": ["joint"] * 10 + ["wheel"]}}
     with DrivenRobot(tmp_path, driver=modes, mock=modes) as robot:
         robot.wait_for_state(BusState.STATE_HOLDING)
-        robot.command(joint_11=1.5, joint_7=0.2)
+        robot.command(joint_11=1.2, joint_7=0.2)
         robot.wait_for_state(BusState.STATE_MOVING)
         robot.let_pass(0.5)
         begin, end = undisturbed(robot, 0.7)
         elapsed = stamp(end) - stamp(begin)
         # Output, not speed: friction takes its share.
-        assert joint(end, "joint_11") - joint(begin, "joint_11") > 0.5 * elapsed
+        speed = (joint(end, "joint_11") - joint(begin, "joint_11")) / elapsed
+        assert speed > 0.5
+        told = [
+            message.velocity[10]
+            for message in robot.joint_states.messages
+            if stamp(begin) <= stamp(message) <= stamp(end)
+        ]
+        assert statistics.median(told) == pytest.approx(speed, rel=0.1)
         assert (joint(end, "joint_7") - joint(begin, "joint_7")) / elapsed == pytest.approx(
             0.2, abs=0.02
         )
@@ -335,6 +394,9 @@ def test_the_lifecycle_without_autostart(tmp_path: Path) -> None:
         state = robot.wait_for_state(BusState.STATE_INACTIVE)
         assert all(servo.torque_enabled for servo in state.servos)
         assert transition(robot, Transition.TRANSITION_CLEANUP)
+        robot.diagnostics.clear()
+        last = robot.graph.wait_for(lambda: robot.diagnostics.last, 5.0, "/diagnostics")
+        assert [status.level for status in last.status] == [DiagnosticStatus.STALE]
         assert not robot.call(topics.RECOVER).success
         assert transition(robot, Transition.TRANSITION_CONFIGURE)
         assert transition(robot, Transition.TRANSITION_ACTIVATE)

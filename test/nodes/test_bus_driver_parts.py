@@ -7,13 +7,12 @@ import pytest
 pytest.importorskip("rclpy")
 pytest.importorskip("snake_interfaces")
 
-from rclpy.clock import ClockType
-from rclpy.time import Time
 from snake_interfaces.msg import JointVelocityCommand
 
 from snake_control.config import BusDriverConfig
 from snake_control.errors import ConfigError
-from snake_control.nodes.bus_messages import checked_velocities
+from snake_control.nodes.bus_command import CommandBuffer
+from snake_control.nodes.bus_messages import InvalidCommandError, checked_velocities, time_message
 from snake_control.nodes.bus_schedule import Schedule
 
 PERIOD = 0.02
@@ -55,7 +54,40 @@ def test_a_look_ahead_shorter_than_two_cycles_is_refused() -> None:
 def test_velocities_come_in_joint_order_with_their_age() -> None:
     message = JointVelocityCommand(name=["b", "a"], velocity=[2.0, 1.0])
     message.header.stamp.sec = 10
-    now = Time(seconds=10, nanoseconds=50_000_000, clock_type=ClockType.ROS_TIME)
-    velocities, age = checked_velocities(message, ["a", "b"], now, 0.1)
+    velocities, age = checked_velocities(message, ["a", "b"], 10_050_000_000, 0.1)
     assert velocities == (1.0, 2.0)
     assert age == pytest.approx(0.05)
+
+
+def test_a_stamp_before_the_epoch_is_an_old_one() -> None:
+    message = JointVelocityCommand(name=["a"], velocity=[1.0])
+    message.header.stamp.sec = -1
+    with pytest.raises(InvalidCommandError, match=r"its stamp is 11.00 s old"):
+        checked_velocities(message, ["a"], 10_000_000_000, 0.1)
+
+
+def test_a_clock_that_stands_at_zero_gives_a_stamp() -> None:
+    assert (time_message(-20).sec, time_message(-20).nanosec) == (0, 0)
+    assert (time_message(3_000_000_005).sec, time_message(3_000_000_005).nanosec) == (3, 5)
+
+
+def test_after_a_stop_a_zero_command_lets_the_next_ones_through() -> None:
+    commands = CommandBuffer(0.1)
+    commands.take([0.5], 0.0, 10.0)
+    assert commands.newest(10.01) == ((0.5,), "moving")
+    commands.wait_for_zero(10.02)
+    commands.take([0.5], 0.0, 10.03)
+    assert commands.newest(10.04) == (None, "holding: waiting for a zero command")
+    commands.take([0.0], 0.0, 10.05)
+    commands.take([0.5], 0.0, 10.07)
+    assert commands.newest(10.08) == ((0.5,), "moving")
+
+
+def test_after_a_stop_a_pause_lets_the_next_command_through() -> None:
+    commands = CommandBuffer(0.1)
+    commands.wait_for_zero(10.0)
+    assert commands.newest(10.3) == (None, "holding: no command yet")
+    commands.take([0.5], 0.0, 10.4)
+    assert commands.newest(10.4)[0] is None
+    commands.take([0.5], 0.0, 11.0)
+    assert commands.newest(11.0) == ((0.5,), "moving")

@@ -1,0 +1,80 @@
+"""The newest velocity command, and whether it may be executed."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Sequence
+
+_ZERO_RAD_S = 1e-6
+
+_PAUSE_S = 0.5
+"""Silence after which a command counts as a new start; a busy host makes shorter ones."""
+
+_REFUSAL_SHOWN_S = 1.0
+
+
+@dataclasses.dataclass(frozen=True)
+class _Command:
+    velocities: tuple[float, ...]
+    computed_at: float
+
+
+class CommandBuffer:
+    """Buffer of one command; one thread writes, another reads. Times are monotonic [s]."""
+
+    def __init__(self, timeout: float) -> None:
+        """Start empty; a command is executed until ``timeout`` seconds after it was computed."""
+        self._timeout = timeout
+        self._command: _Command | None = None
+        self._waiting = False
+        self._heard_at = -math.inf
+        self._refused: tuple[float, str] = (-math.inf, "")
+
+    def take(self, velocities: Sequence[float], age: float, now: float) -> None:
+        """Take joint velocities [rad/s] that were computed ``age`` seconds ago."""
+        paused = now - self._heard_at > max(_PAUSE_S, self._timeout)
+        self._heard_at = now
+        if self._waiting and not paused and any(abs(v) > _ZERO_RAD_S for v in velocities):
+            return
+        self._waiting = False
+        self._command = _Command(tuple(velocities), now - age)
+
+    def refuse(self, why: str, now: float) -> None:
+        """Say in the coming texts that a command was not taken."""
+        self._refused = (now, why)
+
+    def clear(self) -> None:
+        """Forget the command."""
+        self._command = None
+
+    def wait_for_zero(self, now: float) -> None:
+        """Take no command before one that is zero, or before a pause from now on.
+
+        For the end of a stop: whoever went on asking for motion all the time must not get it all
+        at once.
+        """
+        self._waiting = True
+        self._heard_at = now
+        self._command = None
+
+    def newest(self, now: float) -> tuple[tuple[float, ...] | None, str]:
+        """Return the velocities to execute, ``None`` to hold, and why."""
+        command = self._command
+        if self._waiting and now - self._heard_at <= self._timeout:
+            return None, "holding: waiting for a zero command"
+        if command is None:
+            return None, "holding: no command yet"
+        if now - command.computed_at > self._timeout:
+            return None, f"holding: no command for {self._timeout:.2f} s"
+        return command.velocities, "moving"
+
+    def refusal(self, now: float) -> str:
+        """Return why a command was not taken a moment ago, empty if none was refused."""
+        refused_at, why = self._refused
+        return f"; command ignored: {why}" if now - refused_at < _REFUSAL_SHOWN_S else ""
+
+    def age(self, now: float) -> float:
+        """Return the command's age [s], infinite without one."""
+        command = self._command
+        return math.inf if command is None else now - command.computed_at

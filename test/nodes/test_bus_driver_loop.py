@@ -1,0 +1,219 @@
+"""The thread that owns the bus, without ROS: what it does when things go wrong."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from snake_control.config import load
+from snake_control.errors import ServoError
+from snake_control.nodes.bus_loop import BusLoop
+from snake_control.nodes.bus_requests import RefusedError, Requests
+from snake_control.nodes.bus_snapshot import Snapshot, State
+from support.scripted_servos import WRITE, ScriptedServos, packet
+from support.waiting import wait_for
+
+CONFIG = Path(__file__).resolve().parents[2] / "config" / "paper_robot.yaml"
+IDS = range(1, 12)
+AHEAD = (0.5,) * 11
+TORQUE_ENABLE = 24
+INSTRUCTION_ERROR = 64
+
+
+class Driver:
+    """A loop on scripted servos; what it publishes and logs."""
+
+    def __init__(self, servos: ScriptedServos, **changes: Any) -> None:
+        config = load(CONFIG)
+        own = dataclasses.replace(config.bus_driver, port=servos.path, **changes)
+        self.servos = servos
+        self.last: Snapshot | None = None
+        self.on_publish: Callable[[], None] = lambda: None
+        self.warnings: list[str] = []
+        self.errors: list[str] = []
+        self.loop = BusLoop(
+            dataclasses.replace(config, bus_driver=own),
+            self._publish,
+            self.warnings.append,
+            self.errors.append,
+        )
+
+    def _publish(self, snapshot: Snapshot) -> None:
+        self.last = snapshot
+        self.on_publish()
+
+    def wait_for_state(self, state: State, text: str = "") -> Snapshot:
+        def reached() -> Snapshot | None:
+            last = self.last
+            return last if last and last.state is state and text in last.text else None
+
+        return wait_for(reached, 10.0, f"{state.name} {text}")
+
+    def drive(self, state: State, text: str = "", velocities: tuple[float, ...] = AHEAD) -> None:
+        """Command until a state is reached."""
+
+        def reached() -> bool:
+            self.loop.command(velocities, 0.0)
+            return self.last is not None and self.last.state is state and text in self.last.text
+
+        wait_for(reached, 10.0, f"{state.name} {text}")
+
+    def torque(self) -> set[int]:
+        """Ids of the servos with torque."""
+        return {i for i, memory in self.servos.memory.items() if memory[TORQUE_ENABLE]}
+
+
+@pytest.fixture
+def servos() -> Iterator[ScriptedServos]:
+    with ScriptedServos(IDS) as servos:
+        yield servos
+
+
+@contextmanager
+def driving(servos: ScriptedServos, **changes: Any) -> Iterator[Driver]:
+    driver = Driver(servos, **changes)
+    driver.loop.open()
+    try:
+        driver.loop.activate()
+        yield driver
+    finally:
+        driver.loop.close()
+
+
+def silence(servos: ScriptedServos, servo_id: int) -> None:
+    servos.answer = lambda i, answer: b"" if i[2] == servo_id else answer
+
+
+def test_after_a_failed_recovery_torque_can_be_taken_off(servos: ScriptedServos) -> None:
+    with driving(servos) as driver:
+        silence(servos, 3)
+        with pytest.raises(ServoError, match=r"joint_3 .*does not answer"):
+            driver.loop.recover()
+        snapshot = driver.wait_for_state(State.STOPPED, "recovery failed")
+        assert snapshot.readings, "the other servos are read on"
+        assert driver.torque() == set(IDS), "a failed recovery lets nothing fall"
+        with pytest.raises(ServoError, match=r"^joint_3 .*torque off is not confirmed$"):
+            driver.loop.set_torque(False)
+        assert driver.torque() == set()
+
+
+def test_torque_off_on_exit_does_not_ask_whether_a_recovery_failed(servos: ScriptedServos) -> None:
+    def refuse(instruction: bytes, answer: bytes) -> bytes:
+        refused = instruction[2] == 3 and instruction[4] == WRITE
+        return packet(3, 2, INSTRUCTION_ERROR) if refused else answer
+
+    with driving(servos, torque_off_on_exit=True) as driver:
+        servos.answer = refuse
+        with pytest.raises(ServoError, match=r"joint_3 .*refused"):
+            driver.loop.recover()
+        snapshot = driver.wait_for_state(State.STOPPED, "recovery failed")
+        assert all(reading.torque_on for reading in snapshot.readings)
+        assert driver.torque() == set(IDS)
+    assert driver.torque() == set()
+
+
+def test_recover_works_again_on_the_open_port(servos: ScriptedServos) -> None:
+    with driving(servos) as driver:
+        silence(servos, 3)
+        driver.wait_for_state(State.STOPPED, "joint_3 (servo id 3)")
+        with pytest.raises(ServoError):
+            driver.loop.recover()
+        servos.answer = None
+        driver.loop.recover()
+        driver.wait_for_state(State.HOLDING)
+
+
+def test_recover_does_not_undo_an_emergency_stop(servos: ScriptedServos) -> None:
+    with driving(servos) as driver:
+        driver.loop.emergency_stop()
+        with pytest.raises(RefusedError, match="reset_emergency_stop"):
+            driver.loop.recover()
+        driver.wait_for_state(State.EMERGENCY_STOP)
+
+
+def test_recover_keeps_torque_off_that_was_switched_off(servos: ScriptedServos) -> None:
+    with driving(servos) as driver:
+        driver.loop.set_torque(False)
+        driver.loop.recover()
+        driver.wait_for_state(State.TORQUE_OFF)
+        assert driver.torque() == set()
+
+
+def test_torque_that_is_on_already_is_told(servos: ScriptedServos) -> None:
+    servos.memory[2][TORQUE_ENABLE] = 1
+    with driving(servos, torque_on_activate=False) as driver:
+        snapshot = driver.wait_for_state(State.TORQUE_OFF, "still on at joint_2 (servo id 2)")
+        assert [reading.torque_on for reading in snapshot.readings].count(True) == 1
+        assert driver.warnings == ["torque is on already at joint_2 (servo id 2)"]
+        for memory in servos.memory.values():
+            memory[TORQUE_ENABLE] = 1
+        driver.wait_for_state(State.HOLDING, "no command is taken before ~/set_torque")
+        driver.loop.set_torque(False)
+        assert driver.torque() == set()
+
+
+@pytest.mark.parametrize("stop", ["recover", "torque", "emergency stop"])
+def test_after_a_stop_motion_waits_for_a_zero_command(servos: ScriptedServos, stop: str) -> None:
+    with driving(servos) as driver:
+        driver.drive(State.MOVING)
+        if stop == "recover":
+            driver.loop.recover()
+        elif stop == "torque":
+            driver.loop.set_torque(True)
+        else:
+            driver.loop.emergency_stop()
+            driver.loop.reset_emergency_stop()
+        driver.drive(State.HOLDING, "holding: waiting for a zero command")
+        driver.loop.command((0.0,) * 11, 0.0)
+        driver.drive(State.MOVING)
+
+
+def test_a_state_that_cannot_be_published_does_not_stop_the_cycle(servos: ScriptedServos) -> None:
+    def fail() -> None:
+        raise RuntimeError("no publisher")
+
+    with driving(servos) as driver:
+        driver.on_publish = fail
+        driver.drive(State.MOVING)
+        driver.loop.check()
+        assert driver.errors == ["the state cannot be published: RuntimeError('no publisher')"]
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+def test_a_thread_that_fails_lets_the_joints_hold_and_is_noticed(servos: ScriptedServos) -> None:
+    def fail() -> None:
+        raise AttributeError("a mistake of the program")
+
+    def ended() -> bool:
+        try:
+            driver.loop.check()
+        except RefusedError:
+            return True
+        return False
+
+    with driving(servos) as driver:
+        driver.drive(State.MOVING)
+        driver.on_publish = fail
+        wait_for(ended, 10.0, "the end of the thread")
+        begin = time.monotonic()
+        with pytest.raises(RefusedError, match="the bus thread has ended"):
+            driver.loop.recover()
+        assert time.monotonic() - begin < 5.0
+        for servo_id in IDS:
+            goal = int.from_bytes(servos.memory[servo_id][30:32], "little")
+            assert abs(goal - 512) <= 6, "a goal ahead is no hold"
+
+
+def test_a_request_that_timed_out_is_not_carried_out_later() -> None:
+    requests = Requests()
+    done: list[int] = []
+    with pytest.raises(RefusedError, match="not carried out"):
+        requests.carry_out(lambda: done.append(1), 0.05)
+    assert not requests.serve()
+    assert done == []
