@@ -32,7 +32,7 @@ from snake_control.cli.demo_outcome import (
     EXIT_OK,
     EXIT_USAGE,
     Outcome,
-    outcome_at,
+    RunJudge,
     progress_text,
 )
 from snake_control.cli.node_processes import NodeProcesses
@@ -43,7 +43,7 @@ from snake_control.errors import NodeDiedError, NotReadyError, SnakeError
 from snake_control.experiment.series import Series
 from snake_control.experiment.summary import Run, summarise, write_summary
 from snake_control.experiment.table import format_summary
-from snake_control.nodes.recorder import FOLLOWING, Recorder
+from snake_control.nodes.recorder import FOLLOWING, STATUS_WORDS, Recorder
 from snake_control.nodes.topics import ENABLE, START, STOP, Service
 
 _STOP_ORDER = ("scp_controller", "trajectory_generator", "pose_input", "bus_driver", "mock_bus")
@@ -93,6 +93,8 @@ class Demo:
         self._arguments = arguments
         self._config = config
         self._port = directory / "servo_bus"
+        # In a domain that a robot shares, its topics must not meet ours.
+        self._namespace = f"/demo_{os.getpid()}"
         self._signal: int | None = None
         self._progress = ProgressLine()
         os.environ.setdefault("ROS_LOG_DIR", str(directory))
@@ -147,13 +149,13 @@ class Demo:
             time.sleep(0.02)
         self._start("bus_driver")
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-        self._node = rclpy.create_node("demo")
+        self._node = rclpy.create_node("demo", namespace=self._namespace)
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self._node)
         self.recorder = Recorder(self._node, self.series)
 
     def _start(self, kind: str) -> None:
-        given = ["--ros-args"]
+        given = ["--ros-args", "-r", f"__ns:={self._namespace}"]
         for path in self._arguments.all_params_files:
             given += ["--params-file", str(path)]
         single: dict[str, Any] = {}
@@ -195,13 +197,14 @@ class Demo:
 
     def _watch(self, recorder: Recorder) -> Outcome:
         duration_s = self._arguments.duration_s
-        seen, heard = 0, time.monotonic()
+        judge = RunJudge(duration_s, self._config.controller.case)
+        seen, heard = recorder.controller, time.monotonic()
         told = False
         while True:
             self._take_all(recorder)
             now = time.monotonic()
-            if len(self.series) > seen:
-                seen, heard = len(self.series), now
+            if recorder.controller is not seen:
+                seen, heard = recorder.controller, now
             elif now - heard > _SILENCE_TIMEOUT_S:
                 raise NotReadyError(
                     "the next control step", _SILENCE_TIMEOUT_S, "controller_state fell silent"
@@ -212,15 +215,18 @@ class Demo:
             ):
                 return Outcome(_bus_text(recorder.bus), EXIT_FAILED)
             step = recorder.latest
-            if step is None:
-                continue
-            if self._progress.due:
+            if step is not None and self._progress.due:
                 self._progress.show(progress_text(step, duration_s))
             if recorder.fell_at_s is not None and not told:
                 told = True
                 self._progress.say(f"the robot fell at {recorder.fell_at_s:.1f} s")
-            outcome = outcome_at(
-                step.t_s, recorder.fell_at_s, duration_s, self._config.controller.case
+            assert seen is not None
+            outcome = judge.outcome(
+                now,
+                None if step is None else step.t_s,
+                recorder.fell_at_s,
+                STATUS_WORDS[seen.status],
+                seen.text,
             )
             if outcome is not None:
                 return outcome
@@ -306,8 +312,9 @@ class Demo:
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the demo; return its exit code.
 
-    0: done (Case 1 may also fall); 1: fell, a node died or did not get ready; 2: bad arguments or
-    configuration; 130, 143: stopped by SIGINT, SIGTERM.
+    0: done (Case 1 may also fall or be left behind); 1: fell, did not follow the reference, a node
+    died or did not get ready; 2: bad arguments or configuration; 130, 143: stopped by SIGINT,
+    SIGTERM.
     """
     arguments = parse_arguments(argv)
     try:

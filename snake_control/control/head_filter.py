@@ -8,9 +8,9 @@ difference of two stamps. The measured position passes to the estimate as
 leaves about ``a / omega_0^2``.
 
 White noise of standard deviation 1 at ``1 / T`` poses per second leaves
-``sqrt((2 g^2 + 2 h - 3 g h) / d)`` in the position and ``sqrt(2 h^2 / d) / T`` in the velocity, with
-``d = g (4 - 2 g - h)``. With 3 Hz and 100 poses per second these are 0.30 and 1.05 1/s, so 0.5 mm of
-noise leaves 0.15 mm and 0.5 mm/s.
+``sqrt((2 g^2 + 2 h - 3 g h) / d)`` in the position and ``sqrt(2 h^2 / d) / T`` in the velocity,
+with ``d = g (4 - 2 g - h)``. With 3 Hz and 100 poses per second these are 0.30 and 1.05 1/s, so
+0.5 mm of noise leaves 0.15 mm and 0.5 mm/s.
 
 The attitude is filtered the same way: the error is the rotation vector, in the world, from
 predicted to measured attitude, and the rate is the angular velocity in the world.

@@ -48,7 +48,7 @@ class Step:
 
     @property
     def error(self) -> Array:
-        """Tracking error w - w_d with the angles wrapped to +-pi, shape (6,) [m, rad]; NaN while unknown."""
+        """The error w - w_d, angles wrapped to +-pi, shape (6,) [m, rad]; NaN while unknown."""
         error: Array = self.w - self.w_d
         error[3:] = wrap(error[3:])
         return error

@@ -11,9 +11,10 @@ from pathlib import Path
 
 import pytest
 
-from snake_control.cli.demo_outcome import Outcome, outcome_at
+from snake_control.cli.demo_outcome import Outcome, RunJudge
 from snake_control.config import RobotConfig
 from snake_control.experiment.series import Series
+from support.graph import Graph
 from support.process import Process
 from support.waiting import wait_for
 
@@ -32,9 +33,14 @@ FIGURES = {
 class Demo:
     """The demo's process, its results and its children."""
 
-    def __init__(self, directory: Path, *arguments: str) -> None:
+    def __init__(self, directory: Path, *arguments: str, domain_id: int | None = None) -> None:
         self.out = directory / "out"
         environment = {k: v for k, v in os.environ.items() if k != "ROS_DOMAIN_ID"}
+        if domain_id is not None:
+            environment |= {
+                "ROS_DOMAIN_ID": str(domain_id),
+                "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+            }
         self.process = Process(
             "demo",
             [sys.executable, "-m", "snake_control.cli.demo", "--out", str(self.out), *arguments],
@@ -90,8 +96,8 @@ def _ended(pid: int) -> bool:
 def start(tmp_path) -> Iterator:
     started: list[Demo] = []
 
-    def run(*arguments: str) -> Demo:
-        demo = Demo(tmp_path, *arguments)
+    def run(*arguments: str, domain_id: int | None = None) -> Demo:
+        demo = Demo(tmp_path, *arguments, domain_id=domain_id)
         started.append(demo)
         return demo
 
@@ -144,7 +150,84 @@ def test_demo_follows_the_reference_and_leaves_all_results(start):
     ],
 )
 def test_a_fall_fails_in_all_cases_but_the_first(t_s, fell_at_s, case, expected):
-    assert outcome_at(t_s, fell_at_s, duration_s=10.0, case=case) == expected
+    judge = RunJudge(duration_s=10.0, case=case)
+    assert judge.outcome(t_s, t_s, fell_at_s, "tracking", "") == expected
+
+
+def judged(case, status, until_s, since_s=3.0):
+    """How a run of 10 s ends whose controller has that status from ``since_s`` on."""
+    judge = RunJudge(duration_s=10.0, case=case)
+    for k in range(round(50 * until_s) + 1):
+        t = 0.02 * k
+        outcome = judge.outcome(100.0 + t, t, None, status if t >= since_s else "tracking", "why")
+        if outcome is not None:
+            return t, outcome
+    return None
+
+
+@pytest.mark.parametrize("case", [1, 2, 3])
+@pytest.mark.parametrize("status", ["stale", "invalid", "fault", "error too large", "disabled"])
+def test_a_controller_that_does_not_follow_ends_the_run(case, status):
+    words = f"scp_controller did not follow the reference from 3.0 s on: {status}: why"
+    if case == 1 and status in ("fault", "error too large"):
+        assert judged(case, status, 11.0) == (10.0, Outcome(f"duration reached; {words}", 0))
+    else:
+        t, outcome = judged(case, status, 11.0)
+        assert t == pytest.approx(4.0, abs=0.1)
+        assert outcome == Outcome(words, 1)
+
+
+def test_a_controller_that_does_not_follow_at_the_end_is_no_success():
+    _, outcome = judged(3, "fault", 11.0, since_s=9.9)
+    assert outcome.exit_code == 1
+
+
+def test_a_short_lapse_is_forgiven():
+    judge = RunJudge(duration_s=10.0, case=3)
+    assert judge.outcome(5.0, 5.0, None, "stale", "head/odometry is 0.11 s old") is None
+    assert judge.outcome(5.9, 5.9, None, "limited", "") is None
+    assert judge.outcome(6.5, 6.5, None, "stale", "") is None
+    assert judge.outcome(10.0, 10.0, None, "tracking", "") == Outcome("duration reached", 0)
+
+
+def test_a_controller_that_never_follows_says_why():
+    judge = RunJudge(duration_s=10.0, case=3)
+    assert judge.outcome(0.0, None, None, "waiting", "waiting for head/reference") is None
+    assert judge.outcome(0.1, None, None, "invalid", "why") is None
+    outcome = judge.outcome(6.0, None, None, "invalid", "why")
+    assert outcome == Outcome("scp_controller did not follow the reference: invalid: why", 1)
+
+
+def test_a_reference_out_of_reach_is_reported(start, tmp_path):
+    far = tmp_path / "far.yaml"
+    far.write_text(
+        "/**/trajectory_generator:\n  ros__parameters:\n"
+        "    start_pose: [5.0, 0.0, 0.2, 0.39, 0.39, 0.0]\n"
+    )
+    demo = start("--duration", "5", "--params-file", str(far))
+    assert demo.process.wait(90.0) == 1, demo.process.report()
+    assert "error too large" in demo.summary["ended"]
+    assert "max_position_error_m" in demo.process.output()
+
+
+def test_demo_keeps_to_a_namespace_of_its_own(start):
+    with Graph() as graph:
+        demo = start("--duration", "60", domain_id=graph.domain_id)
+        demo.wait_for_rows(10)
+        namespace = f"/demo_{demo.process.pid}"
+
+        def nodes():
+            found = graph.node.get_node_names_and_namespaces()
+            return {(name, where) for name, where in found if name in NODES | {"demo"}}
+
+        expected = {(name, namespace) for name in NODES | {"demo"}}
+        graph.wait_for(lambda: nodes() == expected, 20.0, "the nodes in the namespace")
+        shared = {"/rosout", "/parameter_events", "/diagnostics"}
+        topics = {name for name, _ in graph.node.get_topic_names_and_types()} - shared
+        assert topics
+        assert [name for name in topics if not name.startswith(f"{namespace}/")] == []
+        demo.process.interrupt()
+        assert demo.process.wait(60.0) == 130, demo.process.report()
 
 
 def test_fall_is_reported_and_is_no_success(start, tmp_path):
