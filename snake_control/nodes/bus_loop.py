@@ -14,19 +14,15 @@ from contextlib import contextmanager
 
 from snake_control.ax12.arming import disarm_confirmed, require_off
 from snake_control.ax12.bus import Bus
-from snake_control.ax12.chain import Motion, ServoChain
+from snake_control.ax12.chain import ServoChain
 from snake_control.ax12.joint import JointSetup, joint_setups
-from snake_control.ax12.port import SerialPort
-from snake_control.ax12.startup import cycle_duration, handshake
 from snake_control.config import Config
 from snake_control.errors import BusError, ServoError, SnakeError
 from snake_control.nodes.bus_command import CommandBuffer
+from snake_control.nodes.bus_connection import READ_SHARE, check_servos, open_bus
 from snake_control.nodes.bus_requests import RefusedError, Requests
 from snake_control.nodes.bus_schedule import Schedule
 from snake_control.nodes.bus_snapshot import Snapshot, State
-
-_READ_SHARE = 0.85
-"""Part of the period after which reads are left to the next cycle."""
 
 _REQUEST_TIMEOUT_S = 10.0
 
@@ -95,6 +91,7 @@ class BusLoop:
             self._close_port()
             raise
         self._stopping = False
+        self._fault = ""
         self._requests = Requests()
         self._thread = threading.Thread(target=self._run, name="bus", daemon=True)
         self._thread.start()
@@ -197,7 +194,7 @@ class BusLoop:
                 if self._active and self._chain.armed:
                     self._chain.write(velocities)
                 read_begin = time.monotonic()
-                self._chain.read(begin + _READ_SHARE * self._period)
+                self._chain.read(begin + READ_SHARE * self._period)
             except BusError as error:
                 self._lose_port(error)
             self._look_for_faults()
@@ -291,34 +288,11 @@ class BusLoop:
             ServoError: the port stays open, and what was known of the servos stays.
             BusError: the port is closed.
         """
-        driver = self._driver
-        warnings: list[str] = []
         if self._bus is None:
-            port = SerialPort(driver.port, driver.baud_rate, driver.reply_timeout_s)
-            warnings += port.warnings
-            self._bus = Bus(port, driver.retries)
-        bus = self._bus
-        bus.reset_counters()
-        motion = Motion(
-            self._period,
-            driver.look_ahead_s,
-            driver.acceleration_limit_rad_s2,
-            driver.lost_after_misses,
-        )
+            self._bus = open_bus(self._driver, self._warn)
         with self._watching_the_port():
-            found = handshake(bus, self._joints, self._models)
-            chain = ServoChain(bus, self._joints, found.servos, motion, time.monotonic)
-            chain.look_for_torque()
-        bus.reset_counters()
-        self._chain = chain
-        for text in (*warnings, *found.warnings):
-            self._warn(text)
-        shortest = cycle_duration(found.servos, driver.baud_rate)
-        if shortest > _READ_SHARE * self._period:
-            self._warn(
-                f"a bus cycle takes {1e3 * shortest:.1f} ms at least, too long for rate_hz = "
-                f"{driver.rate_hz:g}: not every servo is read in every cycle; lower Return Delay "
-                "Time or rate_hz, or raise the baud rate"
+            self._chain = check_servos(
+                self._bus, self._joints, self._models, self._driver, self._warn
             )
 
     def _activate(self) -> None:
@@ -402,7 +376,7 @@ class BusLoop:
             for _ in range(_HOLD_BURST):
                 begin = time.monotonic()
                 self._chain.write(None)
-                self._chain.read(begin + _READ_SHARE * self._period)
+                self._chain.read(begin + READ_SHARE * self._period)
                 time.sleep(max(0.0, begin + self._period - time.monotonic()))
         except BusError as error:
             self._lose_port(error)
