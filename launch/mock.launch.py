@@ -4,17 +4,36 @@ ros2 launch snake_control mock.launch.py case:=3
 ros2 service call /trajectory_generator/start std_srvs/srv/Trigger
 """
 
+from collections.abc import Callable
 from pathlib import Path
 
 from ament_index_python.packages import get_package_share_directory
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument, RegisterEventHandler
 from launch.event_handlers import OnProcessIO
+from launch.events.process import ProcessIO
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterFile
 
+# What the mock says when its port is there.
+READY = "servos at"
+
 NODES = ("mock_bus", "bus_driver", "pose_input", "scp_controller", "trajectory_generator")
+
+
+def once_ready(action: Node) -> Callable[[ProcessIO], Node | None]:
+    """Return what to do with a process's output: start ``action`` once it says that it is ready."""
+    heard = ""
+
+    def on_output(event: ProcessIO) -> Node | None:
+        nonlocal heard
+        if READY in heard:
+            return None
+        heard += event.text.decode(errors="replace")
+        return action if READY in heard else None
+
+    return on_output
 
 
 def generate_launch_description() -> LaunchDescription:
@@ -50,13 +69,9 @@ def generate_launch_description() -> LaunchDescription:
             DeclareLaunchArgument(
                 "namespace", default_value="", description="namespace of this robot"
             ),
-            # The driver needs the port, which is there when the mock has said so.
+            # The driver needs the port.
             RegisterEventHandler(
-                OnProcessIO(
-                    target_action=nodes["mock_bus"],
-                    on_stderr=lambda _: driver,
-                    handle_once=True,
-                )
+                OnProcessIO(target_action=nodes["mock_bus"], on_stderr=once_ready(driver))
             ),
             *nodes.values(),
         ]

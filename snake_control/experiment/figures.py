@@ -139,7 +139,7 @@ def base_costs(series: Series, fell_at_s: float | None) -> Figure:
         upper.set_yscale("log")
     _time_axis(upper, t, fell_at_s, last=False)
     upper.set_ylabel("$V_{b1}$")
-    if series.has_ground_truth:
+    if series.truth_known.any():
         lower.plot(
             t,
             1e3 * series.numbers("d_min"),
@@ -151,7 +151,7 @@ def base_costs(series: Series, fell_at_s: float | None) -> Figure:
     lower.axhline(0.0, color=style.FALL, linewidth=0.9)
     _time_axis(lower, t, fell_at_s, last=True)
     lower.set_ylabel("$d_{min}$ [mm]")
-    if series.has_ground_truth:
+    if series.truth_known.any():
         handles, labels = lower.get_legend_handles_labels()
         lower.legend(handles[::-1], labels[::-1], loc="lower right", ncols=2)
     figure.align_ylabels()

@@ -202,40 +202,31 @@ class Series:
         return list(self._numbers[field])
 
     @property
-    def has_ground_truth(self) -> bool:
-        """Whether the true head pose is known in every step."""
-        return len(self) > 0 and bool(np.isfinite(self.numbers("w")).all())
+    def truth_known(self) -> NDArray[np.bool_]:
+        """In which steps the ground truth is known, (N,); there ``w``, ``phi``, ... are taken."""
+        known: NDArray[np.bool_] = np.isfinite(self.numbers("w")).all(axis=1)
+        return known
 
     @property
     def w(self) -> Array:
-        """Head pose: the truth where it is known throughout, else as measured, (N, 6) [m, rad]."""
-        return self.numbers("w" if self.has_ground_truth else "w_measured")
+        """Head pose: the truth where it is known, else as measured, (N, 6) [m, rad]."""
+        return np.where(self.truth_known[:, None], self.numbers("w"), self.numbers("w_measured"))
 
     @property
     def phi(self) -> Array:
-        """Joint angles: the truth where it is known throughout, else as measured, (N, n-1)."""
-        return self.numbers("phi" if self.has_ground_truth else "phi_measured")
+        """Joint angles: the truth where it is known, else as measured, (N, n-1) [rad]."""
+        truth, measured = self.numbers("phi"), self.numbers("phi_measured")
+        return np.where(self.truth_known[:, None], truth, measured)
 
     @property
     def d_min(self) -> Array:
-        """d_min: the truth where it is known throughout, else the controller's, (N,) [m]."""
-        return self.numbers("d_min_true" if self.has_ground_truth else "d_min")
+        """d_min: the truth where it is known, else the controller's, (N,) [m]."""
+        return np.where(self.truth_known, self.numbers("d_min_true"), self.numbers("d_min"))
 
-    def write(self, path: str | Path) -> None:
-        """Write the whole series to a CSV file.
-
-        Raises:
-            OSError: the file cannot be written.
-        """
-        with open(path, "w", encoding="ascii", newline="") as file:
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(_headers(self._columns.values()))
-            for i in range(len(self)):
-                writer.writerow(
-                    text
-                    for field, column in self._columns.items()
-                    for text in _texts(column, self._numbers[field][i])
-                )
+    @property
+    def error(self) -> Array:
+        """Tracking error of ``w`` against w_d, (N, 6) [m, rad]."""
+        return pose_error(self.w, self.numbers("w_d"))
 
     def close(self) -> None:
         """Close the file; the series stays readable."""

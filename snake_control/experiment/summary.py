@@ -134,7 +134,7 @@ def error_from_exponential(series: Series, K: Array, from_s: float) -> tuple[flo
         ``|e(t) - e(t0) exp(-K (t - t0))|`` of R, P, Y, (3,) [rad]; NaN without a step to judge.
     """
     t = series.numbers("t_s")
-    error = series.numbers("error")
+    error = series.error
     scaled = np.flatnonzero(series.numbers("speed_scale") < 1.0)
     start = int(scaled[-1]) + 1 if len(scaled) else 0
     if start >= len(t):
@@ -159,14 +159,14 @@ def _duration_and_fall(series: Series) -> dict[str, Any]:
 
 
 def _tracking(series: Series, K: Array) -> dict[str, Any]:
-    error = series.numbers("error")
+    error = series.error
     known = np.isfinite(error).all(axis=1)
     error = error[known]
     settled = error[series.numbers("t_s")[known] >= SETTLED_FROM_S]
     t0, distance = error_from_exponential(series, K, SETTLED_FROM_S)
     from_40 = f"from_{SETTLED_FROM_S:.0f}_s"
     return {
-        "tracking_error_source": "ground truth" if series.has_ground_truth else "measurement",
+        "tracking_error_source": _source(series.truth_known),
         "tracking_error_rms": _per_component(_rms(error)),
         "tracking_error_final": _per_component(error[-1] if len(error) else np.full(6, np.nan)),
         f"tracking_error_rms_{from_40}": _per_component(_rms(settled)),
@@ -177,6 +177,13 @@ def _tracking(series: Series, K: Array) -> dict[str, Any]:
             for name, value in zip(HEAD_COMPONENTS[3:], distance, strict=True)
         },
     }
+
+
+def _source(truth_known: NDArray[np.bool_]) -> str:
+    if truth_known.any() and not truth_known.all():
+        measured = np.count_nonzero(~truth_known)
+        return f"ground truth, in {measured} of {len(truth_known)} steps measurement"
+    return "ground truth" if truth_known.any() else "measurement"
 
 
 def _stability(series: Series) -> dict[str, Any]:

@@ -126,7 +126,7 @@ def test_demo_follows_the_reference_and_leaves_all_results(start):
 
     series = Series.read(demo.out / "series.csv", RobotConfig())
     assert len(series) == summary["control"]["steps"]
-    assert series.has_ground_truth
+    assert series.truth_known.all()
     t = series.numbers("t_s")
     assert t[0] == 0.0
     assert (t[1:] > t[:-1]).all()

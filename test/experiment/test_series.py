@@ -53,15 +53,6 @@ def test_streamed_file_read_back_is_the_series(robot, tmp_path):
             )
 
 
-def test_written_file_equals_the_streamed_one(tmp_path):
-    series = Series(PAPER_ROBOT, tmp_path / "streamed.csv")
-    for row in eventful_steps(PAPER_ROBOT):
-        series.append(row)
-    series.close()
-    series.write(tmp_path / "written.csv")
-    assert (tmp_path / "written.csv").read_text() == (tmp_path / "streamed.csv").read_text()
-
-
 def test_headers_carry_units_and_follow_the_robot():
     headers = [header for column in columns(LONG_ROBOT) for header in column.headers]
     assert len(set(headers)) == len(headers)
@@ -143,7 +134,23 @@ def test_step_of_wrong_size_leaves_the_series_as_it_was():
 def test_measurement_stands_in_where_the_truth_is_unknown():
     series = Series(PAPER_ROBOT)
     series.append(step(PAPER_ROBOT, 0.0, w=None, w_measured=np.ones(6), d_min=0.01))
-    assert not series.has_ground_truth
+    assert not series.truth_known.any()
     assert series.w == pytest.approx(np.ones((1, 6)))
     assert series.d_min == pytest.approx([0.01])
-    assert series.numbers("error")[0] == pytest.approx([1.0, 1.0, 0.8, 0.6, 0.6, 1.0])
+    assert series.error[0] == pytest.approx([1.0, 1.0, 0.8, 0.6, 0.6, 1.0])
+    assert series.numbers("error")[0] == pytest.approx(series.error[0])
+
+
+def test_one_step_without_truth_changes_no_other():
+    series = Series(PAPER_ROBOT)
+    angles = np.zeros(PAPER_ROBOT.joints)
+    wrong = {"w_measured": np.ones(6), "phi_measured": angles + 1.0, "d_min": 0.01}
+    series.append(step(PAPER_ROBOT, 0.0, **wrong))
+    series.append(step(PAPER_ROBOT, 0.02, **wrong, w=None, phi=None, d_min_true=np.nan))
+    assert series.truth_known.tolist() == [True, False]
+    assert series.w[0] == pytest.approx(step(PAPER_ROBOT, 0.0).w)
+    assert series.w[1] == pytest.approx(np.ones(6))
+    assert series.phi[0] == pytest.approx(np.array(PAPER_ROBOT.start_joint_angles_rad))
+    assert series.phi[1] == pytest.approx(angles + 1.0)
+    assert series.d_min == pytest.approx([0.03, 0.01])
+    assert series.error == pytest.approx(series.numbers("error"))

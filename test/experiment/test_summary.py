@@ -47,6 +47,16 @@ def test_tracking_errors_are_those_of_the_ground_truth():
     assert found["tracking_error_max_from_40_s"]["x_h_m"] == pytest.approx(0.002)
 
 
+def test_source_tells_of_steps_without_ground_truth():
+    def change(t):
+        return {"w": None, "w_measured": np.full(6, 99.0)} if t == 1.0 else {}
+
+    found = summarise(series_of([0.0, 1.0, 2.0], change), RUN)
+    assert found["tracking_error_source"] == "ground truth, in 1 of 3 steps measurement"
+    assert found["tracking_error_final"]["x_h_m"] == 0.0
+    assert found["tracking_error_rms"]["x_h_m"] == pytest.approx(98.99 / math.sqrt(3))
+
+
 def test_exponential_counts_from_the_end_of_the_last_scaling():
     # Scaled until 2 s; from there the exact exponential, plus 0.01 rad in P at 50 s alone.
     def change(t):

@@ -4,8 +4,11 @@ import ast
 import importlib.util
 import re
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
+
+from support.graph import Graph
 
 ROOT = Path(__file__).resolve().parents[2]
 FOUR = {"bus_driver", "pose_input", "scp_controller", "trajectory_generator"}
@@ -61,3 +64,36 @@ def test_the_description_declares_its_arguments(name):
     spec.loader.exec_module(module)
     description = module.generate_launch_description()
     assert {a.name for a in description.get_launch_arguments()} == ARGUMENTS[name]
+
+
+def test_the_driver_waits_for_the_port_of_the_mock():
+    # Only this function: the rest needs launch, which is not on PyPI.
+    parts = [
+        node
+        for node in _tree("mock.launch.py").body
+        if (isinstance(node, ast.FunctionDef) and node.name == "once_ready")
+        or (isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "READY")
+    ]
+    future = ast.parse("from __future__ import annotations").body
+    names: dict = {}
+    exec(compile(ast.Module(future + parts, []), "mock.launch.py", "exec"), names)
+    said = names["once_ready"]("the driver")
+
+    def output(text):
+        return said(SimpleNamespace(text=text.encode()))
+
+    assert output("[WARN] something else\n") is None
+    assert output("[INFO] [mock_bus]: 11 ser") is None
+    assert output("vos at /tmp/port (/dev/pts/3)\n") == "the driver"
+    assert output("11 servos at /tmp/port\n") is None
+
+
+def test_the_mock_says_what_its_launch_file_waits_for(tmp_path):
+    with Graph() as graph:
+        mock = graph.start("mock_bus", params={"port": str(tmp_path / "port")})
+        ready = next(
+            node.value.value
+            for node in _tree("mock.launch.py").body
+            if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "READY"
+        )
+        graph.wait_for(lambda: ready in mock.output(), 30.0, "the ready text")
