@@ -9,7 +9,11 @@ from collections.abc import Sequence
 _ZERO_RAD_S = 1e-6
 
 _PAUSE_S = 0.5
-"""Silence after which a command counts as a new start; a busy host makes shorter ones."""
+"""Silence after which a command counts as a new start; a busy host makes shorter ones.
+
+For as long after a stop zero commands do not count: while servos are armed nobody reads them, and
+a controller without joint states commands zero.
+"""
 
 _REFUSAL_SHOWN_S = 1.0
 
@@ -27,7 +31,7 @@ class CommandBuffer:
         """Start empty; a command is executed until ``timeout`` seconds after it was computed."""
         self._timeout = timeout
         self._command: _Command | None = None
-        self._waiting = False
+        self._waiting_since: float | None = None
         self._heard_at = -math.inf
         self._refused: tuple[float, str] = (-math.inf, "")
 
@@ -35,9 +39,12 @@ class CommandBuffer:
         """Take joint velocities [rad/s] that were computed ``age`` seconds ago."""
         paused = now - self._heard_at > max(_PAUSE_S, self._timeout)
         self._heard_at = now
-        if self._waiting and not paused and any(abs(v) > _ZERO_RAD_S for v in velocities):
-            return
-        self._waiting = False
+        since = self._waiting_since
+        if since is not None and not paused:
+            zero = all(abs(v) <= _ZERO_RAD_S for v in velocities)
+            if not zero or now - since <= _PAUSE_S:
+                return
+        self._waiting_since = None
         self._command = _Command(tuple(velocities), now - age)
 
     def refuse(self, why: str, now: float) -> None:
@@ -54,14 +61,13 @@ class CommandBuffer:
         For the end of a stop: whoever went on asking for motion all the time must not get it all
         at once.
         """
-        self._waiting = True
-        self._heard_at = now
+        self._waiting_since = self._heard_at = now
         self._command = None
 
     def newest(self, now: float) -> tuple[tuple[float, ...] | None, str]:
         """Return the velocities to execute, ``None`` to hold, and why."""
         command = self._command
-        if self._waiting and now - self._heard_at <= self._timeout:
+        if self._waiting_since is not None and now - self._heard_at <= self._timeout:
             return None, "holding: waiting for a zero command"
         if command is None:
             return None, "holding: no command yet"

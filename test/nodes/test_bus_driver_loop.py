@@ -170,7 +170,7 @@ def test_after_a_stop_motion_waits_for_a_zero_command(servos: ScriptedServos, st
             driver.loop.emergency_stop()
             driver.loop.reset_emergency_stop()
         driver.drive(State.HOLDING, "holding: waiting for a zero command")
-        driver.loop.command((0.0,) * 11, 0.0)
+        driver.drive(State.MOVING, velocities=(0.0,) * 11)
         driver.drive(State.MOVING)
 
 

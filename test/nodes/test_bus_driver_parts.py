@@ -78,9 +78,12 @@ def test_after_a_stop_a_zero_command_lets_the_next_ones_through() -> None:
     commands.wait_for_zero(10.02)
     commands.take([0.5], 0.0, 10.03)
     assert commands.newest(10.04) == (None, "holding: waiting for a zero command")
-    commands.take([0.0], 0.0, 10.05)
-    commands.take([0.5], 0.0, 10.07)
-    assert commands.newest(10.08) == ((0.5,), "moving")
+    commands.take([0.0], 0.0, 10.2)  # of a controller that saw no joint states during the stop
+    commands.take([0.5], 0.0, 10.5)
+    assert commands.newest(10.51) == (None, "holding: waiting for a zero command")
+    commands.take([0.0], 0.0, 10.6)
+    commands.take([0.5], 0.0, 10.7)
+    assert commands.newest(10.71) == ((0.5,), "moving")
 
 
 def test_after_a_stop_a_pause_lets_the_next_command_through() -> None:
