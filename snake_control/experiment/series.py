@@ -204,7 +204,7 @@ class Series:
     @property
     def truth_known(self) -> NDArray[np.bool_]:
         """In which steps the ground truth is known, (N,); there ``w``, ``phi``, ... are taken."""
-        known: NDArray[np.bool_] = np.isfinite(self.numbers("w")).all(axis=1)
+        known: NDArray[np.bool_] = np.asarray(np.isfinite(self.numbers("w")).all(axis=1))
         return known
 
     @property
