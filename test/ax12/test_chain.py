@@ -197,6 +197,30 @@ def test_torque_that_is_on_already_is_seen(chain: ServoChain, servos: ScriptedSe
     assert not chain.armed
 
 
+def test_a_joint_pushed_beyond_its_servos_limits_is_held_at_the_limit(
+    servos: ScriptedServos,
+) -> None:
+    def reads(position: int) -> None:
+        nonlocal now
+        now += 0.05
+        servos.memory[1][36:38] = position.to_bytes(2, "little")
+        chain.read(now + 1.0)
+
+    now = 100.0
+    bus = Bus(SerialPort(servos.path, 1000000, reply_timeout_s=0.02), retries=1)
+    servos.memory[1][6:10] = bytes((*(300).to_bytes(2, "little"), *(700).to_bytes(2, "little")))
+    servos.memory[1][36:38] = (695).to_bytes(2, "little")
+    chain = ServoChain(bus, JOINTS, handshake(bus, JOINTS, (12,)).servos, MOTION, lambda: now)
+    chain.arm()
+    reads(720)
+    chain.write([-0.5, 0.0, 0.0])
+    reads(720)
+    chain.write(None)
+    reads(720)
+    assert int.from_bytes(servos.memory[1][30:32], "little") == 700
+    bus.close()
+
+
 def test_an_alarm_that_switches_torque_off_is_a_fault(
     chain: ServoChain, servos: ScriptedServos
 ) -> None:
