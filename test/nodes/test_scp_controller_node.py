@@ -283,7 +283,7 @@ def test_speed_limit_is_named():
         )
 
 
-def test_commands_go_on_while_the_clock_is_set_back():
+def test_commands_go_on_when_the_clock_is_set_back_and_stands():
     with Graph() as graph:
         clock = SettableClock(graph)
         rig = ControllerRig(graph)
@@ -294,8 +294,9 @@ def test_commands_go_on_while_the_clock_is_set_back():
         graph.wait_for(
             lambda: stamp_ns(rig.commands.last) < graph.now_ns() - 3.5e12, 10.0, "the new time"
         )
+        clock.freeze()
         count = len(rig.commands.messages)
-        graph.wait_for(lambda: len(rig.commands.messages) > count + 20, 10.0, "more commands")
+        graph.wait_for(lambda: len(rig.commands.messages) > count + 50, 10.0, "more commands")
         # Its inputs are stamped by a clock that is an hour ahead now.
         assert rig.states.last.status == ControllerState.STATUS_INVALID
         assert is_zero(rig.commands.last)

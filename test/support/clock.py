@@ -10,7 +10,7 @@ from support.graph import Graph
 
 
 class SettableClock:
-    """Publishes ``/clock``: the system's time plus an offset.
+    """Publishes ``/clock``: the system's time plus an offset, until it is frozen.
 
     Attributes:
         offset_s: change it to set the clock [s].
@@ -18,13 +18,20 @@ class SettableClock:
 
     def __init__(self, graph: Graph) -> None:
         self.offset_s = 0.0
+        self._frozen_ns: int | None = None
         self._graph = graph
         self._publisher: Publisher = graph.node.create_publisher(Clock, "/clock", 1)
         graph.every(0.01, self._publish)
 
     def now_ns(self) -> int:
         """Time of this clock [ns]."""
+        if self._frozen_ns is not None:
+            return self._frozen_ns
         return self._graph.now_ns() + round(self.offset_s * 1e9)
+
+    def freeze(self) -> None:
+        """Let the clock stand, as a timer sees one that was set back."""
+        self._frozen_ns = self.now_ns()
 
     def wait_for_listener(self) -> None:
         """Wait until a node hears this clock."""
