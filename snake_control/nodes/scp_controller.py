@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from rclpy.clock import Clock, ClockType
+from rclpy.duration import Duration
 from rclpy.node import Node
 from snake_interfaces.msg import ControllerState
 from std_srvs.srv import SetBool
@@ -30,6 +31,7 @@ from snake_control.nodes.parameters import NodeParameters
 from snake_control.nodes.process import run
 
 _MARKERS_PERIOD_S = 0.1
+_ACKNOWLEDGED_WITHIN = Duration(seconds=0.2)
 
 _STATUS_OF_FAULT = {
     Fault.WAITING: ControllerState.STATUS_WAITING,
@@ -195,6 +197,8 @@ class ScpControllerNode(Node):
         """Leave the joints with a command to rest."""
         now = self.get_clock().now().nanoseconds
         self._command.publish(self._messages.command(Step.at(now, self._robot)))
+        # A publisher that is destroyed may take what it has just sent along.
+        self._command.wait_for_all_acked(_ACKNOWLEDGED_WITHIN)
 
 
 def main() -> int:
