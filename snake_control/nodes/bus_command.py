@@ -55,14 +55,19 @@ class CommandBuffer:
         """Forget the command."""
         self._command = None
 
-    def wait_for_zero(self, now: float) -> None:
+    def wait_for_zero(self, asked_at: float, now: float) -> None:
         """Take no command before one that is zero, or before a pause from now on.
 
         For the end of a stop: whoever went on asking for motion all the time must not get it all
-        at once.
+        at once. If nobody was asking when the end of the stop was, the next command is a new start.
+
+        Args:
+            asked_at: when the end of the stop was asked for; commands may not be read since.
+            now: when it was carried out.
         """
-        self._waiting_since = self._heard_at = now
         self._command = None
+        if asked_at - self._heard_at <= _PAUSE_S:
+            self._waiting_since = self._heard_at = now
 
     def newest(self, now: float) -> tuple[tuple[float, ...] | None, str]:
         """Return the velocities to execute, ``None`` to hold, and why."""

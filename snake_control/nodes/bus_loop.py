@@ -125,7 +125,8 @@ class BusLoop:
     def reset_emergency_stop(self) -> None:
         """Take commands again, from the next one on that is zero."""
         if self._emergency:
-            self._commands.wait_for_zero(time.monotonic())
+            now = time.monotonic()
+            self._commands.wait_for_zero(now, now)
         self._emergency = False
 
     def activate(self) -> None:
@@ -320,10 +321,11 @@ class BusLoop:
         self._refuse_unless_ready()
         if self._fault or self._chain is None:
             raise RefusedError(f"stopped: {self._fault}; call ~/recover")
+        asked_at = time.monotonic()
         self._commands.clear()
         self._torque_wanted = True
         self._arm(self._chain)
-        self._commands.wait_for_zero(time.monotonic())
+        self._commands.wait_for_zero(asked_at, time.monotonic())
 
     def _torque_off(self) -> None:
         self._commands.clear()
@@ -335,6 +337,7 @@ class BusLoop:
 
     def _recover(self) -> None:
         self._refuse_unless_ready()
+        asked_at = time.monotonic()
         self._commands.clear()
         try:
             self._connect()
@@ -345,7 +348,7 @@ class BusLoop:
             self._fault = f"recovery failed: {error}"
             raise
         self._fault = ""
-        self._commands.wait_for_zero(time.monotonic())
+        self._commands.wait_for_zero(asked_at, time.monotonic())
 
     def _refuse_unless_ready(self) -> None:
         if not self._active:

@@ -75,7 +75,7 @@ def test_after_a_stop_a_zero_command_lets_the_next_ones_through() -> None:
     commands = CommandBuffer(0.1)
     commands.take([0.5], 0.0, 10.0)
     assert commands.newest(10.01) == ((0.5,), "moving")
-    commands.wait_for_zero(10.02)
+    commands.wait_for_zero(10.015, 10.02)
     commands.take([0.5], 0.0, 10.03)
     assert commands.newest(10.04) == (None, "holding: waiting for a zero command")
     commands.take([0.0], 0.0, 10.2)  # of a controller that saw no joint states during the stop
@@ -86,9 +86,19 @@ def test_after_a_stop_a_zero_command_lets_the_next_ones_through() -> None:
     assert commands.newest(10.71) == ((0.5,), "moving")
 
 
+def test_a_command_that_nobody_gave_before_the_stop_ended_is_a_new_start() -> None:
+    commands = CommandBuffer(0.1)
+    commands.take([0.5], 0.0, 9.0)
+    commands.wait_for_zero(9.6, 10.0)
+    commands.take([0.5], 0.0, 10.1)
+    assert commands.newest(10.1) == ((0.5,), "moving")
+
+
 def test_after_a_stop_a_pause_lets_the_next_command_through() -> None:
     commands = CommandBuffer(0.1)
-    commands.wait_for_zero(10.0)
+    commands.take([0.5], 0.0, 9.0)
+    # Carrying it out took longer than a pause: nobody read commands meanwhile.
+    commands.wait_for_zero(9.1, 10.0)
     assert commands.newest(10.3) == (None, "holding: no command yet")
     commands.take([0.5], 0.0, 10.4)
     assert commands.newest(10.4)[0] is None
