@@ -109,6 +109,7 @@ class Demo:
         self.startup_s: float | None = None
         self.stop_findings: list[str] = []
         self._node: Any = None
+        self._clients: dict[str, Any] = {}
         self._executor: SingleThreadedExecutor | None = None
         self.recorder: Recorder | None = None
 
@@ -153,6 +154,15 @@ class Demo:
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self._node)
         self.recorder = Recorder(self._node, self.series)
+        # Made long before they are used: a server loses the reply to a client that it has not
+        # discovered yet.
+        for node, service in (
+            ("trajectory_generator", START),
+            ("trajectory_generator", STOP),
+            ("scp_controller", ENABLE),
+        ):
+            name = service.name.replace("~", node, 1)
+            self._clients[name] = self._node.create_client(service.type, name)
 
     def _start(self, kind: str) -> None:
         given = ["--ros-args", "-r", f"__ns:={self._namespace}"]
@@ -258,7 +268,7 @@ class Demo:
     ) -> None:
         """Call a node's service; while ``checked``, signals and dead nodes end the waiting."""
         name = service.name.replace("~", node, 1)
-        client = self._node.create_client(service.type, name)
+        client = self._clients[name]
         deadline = time.monotonic() + timeout_s
         if not self._spin_until(client.service_is_ready, deadline, checked):
             raise NotReadyError(f"service {name}", timeout_s, "nobody offers it")

@@ -30,6 +30,8 @@ from rclpy.signals import SignalHandlerOptions
 
 from support.process import Process
 
+_ASK_AGAIN_S = 1.0
+
 ROOT = Path(__file__).resolve().parents[2]
 CONFIG = ROOT / "config"
 
@@ -192,9 +194,30 @@ class Graph:
         client = self.node.create_client(service.type, name)
         deadline = time.monotonic() + timeout_s
         self.wait_for(client.service_is_ready, timeout_s, f"service {name}")
+        self._wait_until_known_to(node_name, timeout_s)
         future = client.call_async(request)
         self.wait_for(future.done, max(1.0, deadline - time.monotonic()), f"a reply of {name}")
         return future.result()
+
+    def _wait_until_known_to(self, node_name: str, timeout_s: float) -> None:
+        """Wait until a node has discovered all clients made so far.
+
+        A reply is lost while the server has not discovered its client, which the client cannot see.
+        Clients are announced in order: when a newer one gets replies, the older ones will, too.
+        """
+        probe = self.node.create_client(GetParameters, f"/{node_name}/get_parameters")
+        self.wait_for(probe.service_is_ready, timeout_s, f"parameters of {node_name}")
+        questions: list[tuple[float, Any]] = []
+
+        def answered() -> bool:
+            if any(future.done() for _, future in questions):
+                return True
+            now = time.monotonic()
+            if not questions or now - questions[-1][0] > _ASK_AGAIN_S:
+                questions.append((now, probe.call_async(GetParameters.Request())))
+            return False
+
+        self.wait_for(answered, timeout_s, f"a reply of {node_name}")
 
     def set_parameters(self, node_name: str, **values: Any) -> dict[str, Any]:
         """Set parameters of a node while it runs (``controller__case=1`` for ``controller.case``).
