@@ -10,10 +10,10 @@ from numpy.typing import ArrayLike, NDArray
 from snake_control.config import ControllerConfig, RobotConfig
 from snake_control.control.limits import JointLimits
 from snake_control.control.reference import Reference
-from snake_control.control.sub_tasks import base_scp_velocities, costs, head_scp_velocities
+from snake_control.control.sub_tasks import base_scp_velocities, head_scp_velocities
 from snake_control.errors import SingularError
-from snake_control.model.geometry import geometry
-from snake_control.model.redundancy import joint_velocities, kinematics
+from snake_control.model.posture import Posture
+from snake_control.model.redundancy import joint_velocities
 from snake_control.model.rotation import wrap
 
 Array = NDArray[np.float64]
@@ -91,18 +91,17 @@ class ScpController:
             SingularError: B_tilde has no inverse, or the answer is not finite.
         """
         del q_dot, t
-        g = geometry(self._robot, q)
-        k = kinematics(g)
+        posture = Posture(self._robot, q)
+        g, k = posture.g, posture.k
         # Raises in a singular head posture, where the costs would divide by V_h = 0.
         _ = k.F_bar
-        cost = costs(g, k)
         w, phi = g.q[:6], g.q[6:]
         error = w - reference.w_d
         error[3:] = wrap(error[3:])
         phi_tilde_dot_d = np.concatenate(
             (
-                head_scp_velocities(k, cost, self._gains),
-                base_scp_velocities(k, cost, self._gains),
+                head_scp_velocities(posture, self._gains),
+                base_scp_velocities(posture, self._gains),
             )
         )
         u = joint_velocities(k, reference.w_d_dot - self._K * error, phi_tilde_dot_d)
@@ -121,11 +120,11 @@ class ScpController:
             speed_scale=limited.speed_scale,
             speed_limited=limited.speed_limited,
             range_limited=limited.range_limited,
-            V_h=cost.V_h,
-            V_b1=cost.V_b1,
-            d_min=cost.support.d_min,
+            V_h=posture.V_h,
+            V_b1=posture.V_b1,
+            d_min=posture.support.d_min,
             sigma_min_B_tilde=k.sigma_min_B_tilde,
             sigma_min_A_hat=k.sigma_min_A_hat,
-            support_polygon=cost.support.polygon,
-            center_of_mass=cost.support.center_of_mass,
+            support_polygon=posture.support.polygon,
+            center_of_mass=posture.support.center_of_mass,
         )

@@ -44,15 +44,3 @@ def log_V_b1(
     weights[:, 6:] = -2.0 * inverse[:rows, :rows] @ k.B_bar
     gradient = contracted_gradient(g, weights) - 2.0 * log_V_h_gradient
     return float(log_det - 2.0 * np.log(V_h)), gradient
-
-
-def V_b1(g: Geometry, k: Kinematics, V_h: float, V_h_gradient: Array) -> tuple[float, Array]:
-    """Return V_b1 and its gradient by q, (n + 5,); arguments as ``V_h`` returns them.
-
-    V_b1 spans many orders of magnitude on long robots; where it leaves the range of doubles it is
-    infinite and its gradient with it: use ``log_V_b1`` there.
-    """
-    value, gradient = log_V_b1(g, k, V_h_gradient / V_h, V_h)
-    with np.errstate(over="ignore"):
-        value = float(np.exp(value))
-        return value, value * gradient

@@ -8,8 +8,8 @@ import pytest
 from snake_control.model.constraints import constraint_matrix, contracted_gradient
 from snake_control.model.geometry import geometry
 from snake_control.model.manipulability import V_h
+from snake_control.model.posture import Posture
 from snake_control.model.redundancy import kinematics
-from snake_control.model.singularity import V_b1, log_V_b1
 from snake_control.model.stability import support
 from support.derivatives import gradient
 from support.robots import ROBOTS, random_q
@@ -55,20 +55,15 @@ def test_V_b1(posture):
     robot, q = posture
 
     def log_value(x):
-        g = geometry(robot, x)
-        k = kinematics(g)
-        value, value_gradient = V_h(g, k)
-        return log_V_b1(g, k, value_gradient / value, value)[0]
+        return Posture(robot, x).log_V_b1
 
-    g = geometry(robot, q)
-    k = kinematics(g)
-    v_h, v_h_gradient = V_h(g, k)
-    found, found_gradient = V_b1(g, k, v_h, v_h_gradient)
+    found = Posture(robot, q)
+    k = found.k
     if robot.links < 20:
         direct = np.linalg.det(k.E_tilde @ k.E_tilde.T)
-        assert found == pytest.approx(direct, rel=1e-6)
+        assert found.V_b1 == pytest.approx(direct, rel=1e-6)
     # A larger step than elsewhere: on long robots log V_b1 itself carries round-off.
-    assert relative(found_gradient / found, gradient(log_value, q, h=1e-3)) < 1e-6
+    assert relative(found.log_V_b1_gradient, gradient(log_value, q, h=1e-3)) < 1e-6
 
 
 def test_d_min(posture):

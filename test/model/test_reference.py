@@ -8,9 +8,8 @@ import pytest
 from snake_control.config import ControllerConfig
 from snake_control.control.reference import Reference
 from snake_control.control.scp_controller import ScpController
-from snake_control.control.sub_tasks import base_scp_velocities, costs, head_scp_velocities
-from snake_control.model.geometry import geometry
-from snake_control.model.redundancy import kinematics
+from snake_control.control.sub_tasks import base_scp_velocities, head_scp_velocities
+from snake_control.model.posture import Posture
 from support.robots import PAPER, paper_states
 
 STATES = paper_states()
@@ -22,39 +21,34 @@ def state(request):
 
 
 @pytest.fixture
-def g(state):
-    return geometry(PAPER, state["q"])
+def posture(state):
+    return Posture(PAPER, state["q"])
 
 
-@pytest.fixture
-def k(g):
-    return kinematics(g)
-
-
-def test_F_bar(state, k):
+def test_F_bar(state, posture):
     expected = np.array(state["F_bar"])
-    np.testing.assert_allclose(k.F_bar, expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max())
+    np.testing.assert_allclose(
+        posture.k.F_bar, expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max()
+    )
 
 
-def test_E_tilde(state, k):
-    sigma = np.linalg.svd(k.E_tilde, compute_uv=False)
+def test_E_tilde(state, posture):
+    sigma = np.linalg.svd(posture.k.E_tilde, compute_uv=False)
     np.testing.assert_allclose(sigma, state["E_tilde_singular_values"], rtol=1e-9)
 
 
-def test_costs(state, g, k):
-    cost = costs(g, k)
-    assert cost.V_h == pytest.approx(state["V_h"], rel=1e-9)
-    assert cost.V_b1 == pytest.approx(state["V_b1"], rel=1e-9)
-    assert cost.support.d_min == pytest.approx(state["d_min"], rel=1e-9)
+def test_costs(state, posture):
+    assert posture.V_h == pytest.approx(state["V_h"], rel=1e-9)
+    assert posture.V_b1 == pytest.approx(state["V_b1"], rel=1e-9)
+    assert posture.support.d_min == pytest.approx(state["d_min"], rel=1e-9)
 
 
 @pytest.mark.parametrize("case", [2, 3])
-def test_scp_velocities(state, g, k, case):
-    cost = costs(g, k)
+def test_scp_velocities(state, posture, case):
     gains = ControllerConfig(case=case)
-    np.testing.assert_allclose(head_scp_velocities(k, cost, gains), state["phi_dot_hd"], rtol=1e-6)
+    np.testing.assert_allclose(head_scp_velocities(posture, gains), state["phi_dot_hd"], rtol=1e-6)
     np.testing.assert_allclose(
-        base_scp_velocities(k, cost, gains), state[f"phi_dot_bd_case{case}"], rtol=1e-6
+        base_scp_velocities(posture, gains), state[f"phi_dot_bd_case{case}"], rtol=1e-6
     )
 
 
@@ -70,8 +64,8 @@ def test_control_law(state):
 
 def test_table_1_start():
     """Rounded figures of the same independent implementation at phi(0) of Table 1."""
-    cost = costs(geometry(PAPER, STATES[0]["q"]), kinematics(geometry(PAPER, STATES[0]["q"])))
+    posture = Posture(PAPER, STATES[0]["q"])
     assert STATES[0]["q"][2] - PAPER.wheel_radius_m == pytest.approx(0.2993, abs=5e-5)
-    assert cost.V_h == pytest.approx(5.8775e-7, rel=1e-4)
-    assert cost.V_b1 == pytest.approx(2.4757e8, rel=1e-4)
-    assert cost.support.d_min == pytest.approx(0.034238, rel=1e-4)
+    assert posture.V_h == pytest.approx(5.8775e-7, rel=1e-4)
+    assert posture.V_b1 == pytest.approx(2.4757e8, rel=1e-4)
+    assert posture.support.d_min == pytest.approx(0.034238, rel=1e-4)
