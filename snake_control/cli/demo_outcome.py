@@ -42,9 +42,9 @@ class _Trouble:
 class RunJudge:
     """Decides how a run ends, from what the controller says and whether the robot has fallen.
 
-    A fall ends a run a little later. A controller that does not follow its reference for a second,
-    or at the end, makes it a failure. In Case 1 a fall, a singular posture and a head left behind
-    are what the paper found, and no failure.
+    A fall ends a run a little later. A controller that does not follow its reference for a second
+    makes it a failure; a lapse that the end of the run meets gets its second, too. In Case 1 a
+    fall, a singular posture and a head left behind are what the paper found, and no failure.
     """
 
     def __init__(self, duration_s: float, case: int) -> None:
@@ -89,7 +89,7 @@ class RunJudge:
         if case == 1 and status in _FINDINGS_OF_CASE_1:
             return Outcome(f"duration reached; {words}", EXIT_OK) if over else None
         lasting = now - trouble.since > (_START_S if t_s is None else _TROUBLE_S)
-        return Outcome(words, EXIT_FAILED) if over or lasting else None
+        return Outcome(words, EXIT_FAILED) if lasting else None
 
 
 def progress_text(step: Step, duration_s: float) -> str:

@@ -178,8 +178,16 @@ def test_a_controller_that_does_not_follow_ends_the_run(case, status):
 
 
 def test_a_controller_that_does_not_follow_at_the_end_is_no_success():
-    _, outcome = judged(3, "fault", 11.0, since_s=9.9)
+    t, outcome = judged(3, "fault", 12.0, since_s=9.9)
+    assert t == pytest.approx(10.9, abs=0.1)
     assert outcome.exit_code == 1
+
+
+def test_a_lapse_that_the_end_meets_may_pass():
+    judge = RunJudge(duration_s=10.0, case=3)
+    assert judge.outcome(9.98, 9.98, None, "stale", "joint_states is 0.11 s old") is None
+    assert judge.outcome(10.1, 10.1, None, "stale", "joint_states is 0.12 s old") is None
+    assert judge.outcome(10.2, 10.2, None, "tracking", "") == Outcome("duration reached", 0)
 
 
 def test_a_short_lapse_is_forgiven():
