@@ -1,4 +1,14 @@
-"""Conditions 1 to 5 and the Assumptions of the paper that a configuration can break."""
+"""Conditions 1 to 5 and the Assumptions of the paper that a configuration can break.
+
+With no head links the robot is a planar snake, as in the paper's references [9, 10]: all links lie
+on the floor and w is [x, y, Y]. The same reasons then give other conditions:
+
+* Link 1 has no wheels. Its wheels would be a constraint row that no joint enters, so B_tilde would
+  have no inverse (this stands in for Conditions 2, 3 and 5, which are about head joints).
+* Condition 1 and Assumption 2 hold as they are: the tail has wheels, all joints are yaw.
+* Condition 4, fewer controlled components than inputs, is 1 <= m and 3 + m < n - 1. Link 1 gives
+  no B-SCP: no joint lies in front of it.
+"""
 
 from __future__ import annotations
 
@@ -18,19 +28,23 @@ def check_conditions(
 
     Args:
         links: n, number of links.
-        head_links: n_h, number of links of the raised head part.
+        head_links: n_h, number of links of the raised head part; 0 for a planar snake.
         wheelless_links: links of the base part without wheels, counted from the head, from 1.
-        head_scp_joints: the n_h - 4 joints of the head part used as H-SCPs.
+        head_scp_joints: the n_h - 4 joints of the head part used as H-SCPs; none if planar.
         joint_axes: ``pitch`` or ``yaw`` for joints 1 .. n-1.
 
     Raises:
         ConfigError: names the Condition or Assumption, the value and what would satisfy it.
     """
+    if head_links == 0:
+        _check_planar(links, wheelless_links, head_scp_joints, joint_axes)
+        return
     if head_links < 4:
         raise ConfigError(
             "robot.head_links",
             head_links,
-            "Condition 5: at least 4 head links, or the head cannot take any position and attitude",
+            "Condition 5: at least 4 head links, or the head cannot take any position and "
+            "attitude; or 0 for a planar snake",
         )
     if links < head_links + 2:
         raise ConfigError(
@@ -43,6 +57,41 @@ def check_conditions(
     _check_wheelless(links, head_links, wheelless_links)
     _check_head_scps(head_links, head_scp_joints, joint_axes)
     _check_redundancy(links, head_links, wheelless_links)
+
+
+def _check_planar(
+    links: int,
+    wheelless_links: Sequence[int],
+    head_scp_joints: Sequence[int],
+    joint_axes: Sequence[str],
+) -> None:
+    _check_axes(links, 0, joint_axes)
+    if len(head_scp_joints):
+        raise ConfigError(
+            "robot.head_scp_joints",
+            list(head_scp_joints),
+            "a planar snake (robot.head_links = 0) has no H-SCPs: give [0]",
+        )
+    field = "robot.wheelless_links"
+    given = list(wheelless_links)
+    if 1 not in given:
+        raise ConfigError(
+            field,
+            given,
+            "full rank of B_tilde: link 1 of a planar snake must have no wheels, or no joint could "
+            "turn the head",
+        )
+    _check_tail(links, given)
+    _check_within(given, 1, links - 1)
+    m = len(given) - 1
+    if not 1 <= m < links - 4:
+        raise ConfigError(
+            field,
+            given,
+            f"Condition 4 of a planar snake: 1 <= m and 3 + m < n - 1 with m = wheelless links "
+            f"without link 1; here m = {m} and n - 1 = {links - 1}, so the number of wheelless "
+            f"links must be 2 to {links - 4}",
+        )
 
 
 def _check_redundancy(links: int, head_links: int, wheelless_links: Sequence[int]) -> None:
@@ -80,6 +129,8 @@ def _check_axes(links: int, head_links: int, joint_axes: Sequence[str]) -> None:
                 axis,
                 f"Assumption 2: joint {joint} belongs to the base part and must be yaw",
             )
+    if head_links == 0:
+        return
     if joint_axes[head_links - 1] != "pitch":
         raise ConfigError(
             f"{field}[{head_links - 1}]",
@@ -97,23 +148,34 @@ def _check_axes(links: int, head_links: int, joint_axes: Sequence[str]) -> None:
 def _check_wheelless(links: int, head_links: int, wheelless_links: Sequence[int]) -> None:
     field = "robot.wheelless_links"
     given = list(wheelless_links)
-    if sorted(set(given)) != given:
-        raise ConfigError(field, given, "give each link once, in rising order")
     if head_links + 1 in given:
         raise ConfigError(
             field,
             given,
             f"Assumption 5: link {head_links + 1}, the first of the base part, needs wheels",
         )
+    _check_tail(links, given)
+    _check_within(given, head_links + 2, links - 1)
+
+
+def _check_tail(links: int, given: list[int]) -> None:
     if links in given:
-        raise ConfigError(field, given, f"Condition 1: link {links}, the tail, needs wheels")
+        raise ConfigError(
+            "robot.wheelless_links", given, f"Condition 1: link {links}, the tail, needs wheels"
+        )
+
+
+def _check_within(given: list[int], first: int, last: int) -> None:
+    field = "robot.wheelless_links"
+    if sorted(set(given)) != given:
+        raise ConfigError(field, given, "give each link once, in rising order")
     for link in given:
-        if not head_links + 2 <= link <= links - 1:
+        if not first <= link <= last:
             raise ConfigError(
                 field,
                 given,
-                f"link {link} is not between the first base link and the tail: "
-                f"{head_links + 2} to {links - 1}",
+                f"link {link} is not a link of the base part that may go without wheels: {first} "
+                f"to {last}",
             )
 
 

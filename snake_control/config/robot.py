@@ -38,7 +38,12 @@ class RobotConfig:
     """Structure and measures of the robot; defaults are the robot of the paper (Section 5)."""
 
     links: int = parameter(12, "n, number of links", low=6, high=200)
-    head_links: int = parameter(5, "n_h, number of links of the raised head part", low=1, high=198)
+    head_links: int = parameter(
+        5,
+        "n_h, number of links of the raised head part; 0 for a planar snake, all on the floor",
+        low=0,
+        high=198,
+    )
     wheelless_links: tuple[int, ...] = parameter(
         (7, 9, 11),
         "links of the base part without wheels, counted from the head, from 1 ([0] for none)",
@@ -143,13 +148,26 @@ class RobotConfig:
 
     @property
     def base_scp_joints(self) -> tuple[int, ...]:
-        """B-SCPs: joint i_k - 1 for every wheelless link i_k (paper, Section 2)."""
-        return tuple(link - 1 for link in self.wheelless_links)
+        """B-SCPs: joint i_k - 1 for every wheelless link i_k (paper, Section 2).
+
+        Link 1 of a planar snake has no joint in front of it and gives none.
+        """
+        return tuple(link - 1 for link in self.wheelless_links if link > 1)
 
     @property
     def scp_joints(self) -> tuple[int, ...]:
         """All SCPs, H-SCPs first: the order of phi_tilde."""
         return self.head_scp_joints + self.base_scp_joints
+
+    @property
+    def planar(self) -> bool:
+        """Whether no part is raised: all links on the floor, w = [x, y, Y]."""
+        return self.head_links == 0
+
+    @property
+    def controlled(self) -> tuple[int, ...]:
+        """Indices of [x_h, y_h, z_h, R, P, Y], from 0, that the controller moves."""
+        return (0, 1, 5) if self.planar else (0, 1, 2, 3, 4, 5)
 
     @property
     def wheeled_links(self) -> tuple[int, ...]:

@@ -15,6 +15,7 @@ from snake_control.errors import SingularError
 from snake_control.model.posture import Posture
 from snake_control.model.redundancy import joint_velocities
 from snake_control.model.rotation import wrap
+from snake_control.model.structure import structure
 
 Array = NDArray[np.float64]
 
@@ -25,7 +26,8 @@ class ControlResult:
 
     Attributes:
         w, w_d, w_d_dot: head pose, wanted pose and its rate, (6,) [m, rad, m/s, rad/s].
-        error: w - w_d with angles in [-pi, pi), (6,).
+        error: w - w_d with angles in [-pi, pi), (6,); 0 for z, R, P of a planar snake, which its
+            controller does not move.
         phi: joint angles, (n-1,) [rad].
         phi_tilde_dot_d: wanted SCP velocities, H-SCPs first (25), (27), (m,) [rad/s].
         u_unlimited, u: joint velocities (22) before and after limiting, (n-1,) [rad/s].
@@ -72,7 +74,8 @@ class ScpController:
         """
         self._robot = robot
         self._gains = controller
-        self._K = np.array(controller.K[:6])
+        self._w = structure(robot).w
+        self._K = np.array(controller.K[:6])[self._w]
         self._limits = JointLimits(robot)
 
     def step(
@@ -96,15 +99,18 @@ class ScpController:
         # Raises in a singular head posture, where the costs would divide by V_h = 0.
         _ = k.F_bar
         w, phi = g.q[:6], g.q[6:]
-        error = w - reference.w_d
-        error[3:] = wrap(error[3:])
+        difference = w - reference.w_d
+        difference[3:] = wrap(difference[3:])
+        error = np.zeros(6)
+        error[self._w] = difference[self._w]
         phi_tilde_dot_d = np.concatenate(
             (
                 head_scp_velocities(posture, self._gains),
                 base_scp_velocities(posture, self._gains),
             )
         )
-        u = joint_velocities(k, reference.w_d_dot - self._K * error, phi_tilde_dot_d)
+        w_dot = reference.w_d_dot[self._w] - self._K * error[self._w]
+        u = joint_velocities(k, w_dot, phi_tilde_dot_d)
         if not np.isfinite(u).all():
             raise SingularError("B_tilde", k.sigma_min_B_tilde)
         limited = self._limits.apply(phi, u)

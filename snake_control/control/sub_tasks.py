@@ -18,7 +18,7 @@ def head_scp_velocities(posture: Posture, gains: ControllerConfig) -> Array:
     if gains.a_h == 0.0:
         return np.zeros(s.m_h)
     by_phi = posture.V_h_gradient[6:]
-    F_2h = k.F_bar[: len(s.theta_h), 6 : 6 + s.m_h]
+    F_2h = k.F_bar[: len(s.theta_h), len(s.w) : len(s.w) + s.m_h]
     return gains.a_h * (by_phi[s.scp_h] + by_phi[s.theta_h] @ F_2h)
 
 
@@ -36,5 +36,5 @@ def base_scp_velocities(posture: Posture, gains: ControllerConfig) -> Array:
         by_phi += gains.b_prime * posture.support.gradient[6:]
     if gains.a_b == 0.0:
         return np.zeros(s.m_b)
-    F_3b = k.F_bar[len(s.theta_h) :, 6 + s.m_h :]
+    F_3b = k.F_bar[len(s.theta_h) :, len(s.w) + s.m_h :]
     return gains.a_b * (by_phi[s.scp_b] + by_phi[s.theta_b] @ F_3b)

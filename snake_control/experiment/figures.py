@@ -168,6 +168,8 @@ def _joint_panels(
     fell_at_s: float | None,
 ) -> None:
     t = series.numbers("t_s")
+    # A planar snake has no head part.
+    groups = {name: joints for name, joints in groups.items() if len(joints)}
     panels = figure.subplots(len(groups), 1, sharex=True, squeeze=False)[:, 0]
     for panel, (name, joints) in zip(panels, groups.items(), strict=True):
         _joint_lines(panel, t, values, joints, symbol)

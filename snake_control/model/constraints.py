@@ -2,7 +2,7 @@
 
 Rows G(q) q_dot = 0: sideways velocity of each wheeled base link's centre (ascending), then the
 vertical velocity of the first base link's centre and the x and y components of its angular
-velocity.
+velocity. A planar snake has the wheel rows only: it moves on the floor by itself.
 """
 
 from __future__ import annotations
@@ -58,15 +58,16 @@ def constraint_matrix(g: Geometry) -> Array:
     """Return G(q) with G q_dot = 0, equations (1)-(3).
 
     Returns:
-        Shape (n_b - m_b + 3, n + 5); wheel rows in m/s, floor rows in m/s, rad/s, rad/s.
+        Shape (wheels + floor_rows, n + 5); wheel rows in m/s, floor rows in m/s, rad/s, rad/s.
     """
     s = g.s
     wheels = len(s.wheeled)
     moved_by_head = 6 + s.n_h
-    matrix = np.zeros((wheels + 3, s.n + 5))
+    matrix = np.zeros((wheels + s.floor_rows, s.n + 5))
     matrix[:wheels, :moved_by_head] = lateral_map(g) @ g.twists[[0, 1, 5]]
     matrix[:wheels, moved_by_head:] = lateral_joint_map(g)
-    matrix[wheels:, :moved_by_head] = floor_map(g) @ g.twists
+    if s.floor_rows:
+        matrix[wheels:, :moved_by_head] = floor_map(g) @ g.twists
     return matrix
 
 
@@ -77,7 +78,7 @@ def contracted_gradient(g: Geometry, weights: Array) -> Array:
 
     Args:
         g: the posture.
-        weights: shape of G, (n_b - m_b + 3, n + 5).
+        weights: shape of G, (wheels + floor_rows, n + 5).
 
     Returns:
         Derivative by each component of q, (n + 5,).
@@ -90,9 +91,8 @@ def contracted_gradient(g: Geometry, weights: Array) -> Array:
     gradient[moved_by_head:] = _base_gradient(
         g, on_twists @ g.twists[[0, 1, 5]].T, weights[:wheels, moved_by_head:]
     )
-    gradient[:moved_by_head] = _head_gradient(
-        g, lateral_map(g).T @ on_twists, weights[wheels:, :moved_by_head]
-    )
+    on_floor = weights[wheels:, :moved_by_head] if s.floor_rows else np.zeros((3, moved_by_head))
+    gradient[:moved_by_head] = _head_gradient(g, lateral_map(g).T @ on_twists, on_floor)
     return gradient
 
 

@@ -30,7 +30,8 @@ def head_pose_on_floor(robot: RobotConfig, phi: ArrayLike, base: ArrayLike) -> A
     x, y, yaw = np.asarray(base, dtype=float)
     at_origin = geometry(robot, np.concatenate((np.zeros(6), np.asarray(phi, dtype=float))))
     rotation = rotation_from_rpy((0.0, 0.0, yaw)) @ at_origin.base_rotation.T
-    tip = np.array([x, y, robot.wheel_radius_m]) - rotation @ at_origin.base_origin
+    from_tip = at_origin.base_origin - at_origin.head_points[0]
+    tip = np.array([x, y, robot.wheel_radius_m]) - rotation @ from_tip
     return np.concatenate((tip, rpy_from_rotation(rotation)))
 
 

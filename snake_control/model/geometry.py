@@ -3,6 +3,9 @@
 The head part is a spatial chain. All joints of the base part turn about the same axis
 (Assumption 2), so the base part is planar in the frame of its first link, ``base``, level or not.
 Its origin is the front end of link n_h + 1, where joint n_h turns.
+
+A planar snake is a base part alone, its frame that of link 1. It lies on the floor, so z, R and P
+in its q stand for nothing and are not read.
 """
 
 from __future__ import annotations
@@ -84,8 +87,11 @@ def geometry(robot: RobotConfig, q: ArrayLike) -> Geometry:
         bad = [i for i in range(len(q)) if not np.isfinite(q[i])]
         raise ModelError(f"q is not finite at index {bad}")
     half = robot.half_length_m
-    rotation = rotation_from_rpy(q[3:6])
-    point = q[:3]
+    rpy, point = q[3:6], q[:3]
+    if robot.planar:
+        rpy = np.array([0.0, 0.0, q[5]])
+        point = np.array([q[0], q[1], robot.wheel_radius_m])
+    rotation = rotation_from_rpy(rpy)
     points, centers, axes = [point], [], []
     for joint in range(s.n_h):
         forward = rotation[:, 0]
@@ -94,7 +100,10 @@ def geometry(robot: RobotConfig, q: ArrayLike) -> Geometry:
         points.append(point)
         axes.append(rotation @ s.axes[joint])
         rotation = rotation @ _joint_rotation(s.axes[joint], q[6 + joint])
-    head_points, head_axes = np.array(points), np.array(axes)
+    head_points, head_axes = np.array(points), np.reshape(axes, (s.n_h, 3))
+    twists = _twists(rpy, rotation, head_points, head_axes)
+    if robot.planar:
+        twists[:, 2:5] = 0.0
 
     base = planar_base(s, q[6 + s.n_h :])
     return Geometry(
@@ -107,9 +116,9 @@ def geometry(robot: RobotConfig, q: ArrayLike) -> Geometry:
         base_rotation=rotation,
         base_origin=point,
         head_points=head_points,
-        head_centers=np.array(centers),
+        head_centers=np.reshape(centers, (s.n_h, 3)),
         head_axes=head_axes,
-        twists=_twists(q, rotation, head_points, head_axes),
+        twists=twists,
     )
 
 
@@ -130,8 +139,8 @@ def _joint_rotation(axis: Array, angle: float) -> Array:
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
-def _twists(q: Array, base_rotation: Array, points: Array, axes: Array) -> Array:
-    turning = np.hstack((rpy_rate_map(q[3:6]), axes.T))
+def _twists(rpy: Array, base_rotation: Array, points: Array, axes: Array) -> Array:
+    turning = np.hstack((rpy_rate_map(rpy), axes.T))
     # R, P, Y turn about the tip; joint i turns about the front end of link i + 1.
     pivots = points[[0, 0, 0, *range(1, len(points))]]
     twists = np.zeros((6, 3 + turning.shape[1]))

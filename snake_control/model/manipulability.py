@@ -17,12 +17,15 @@ def V_h(g: Geometry, k: Kinematics) -> tuple[float, Array]:
 
     B_tilde is block triangular and its base block has l on the diagonal, so
     V_h = |det head block| l^(n_b - m_b - 1), and only head joints and attitude have a part in it.
+    That of a planar snake is constant.
 
     Returns:
         V_h, and its gradient (n + 5,).
     """
     s = g.s
-    scale = s.robot.half_length_m ** (len(s.wheeled) - 1)
+    scale = s.robot.half_length_m ** len(s.theta_b)
+    if s.robot.planar:
+        return scale, np.zeros(s.n + 5)
     U, sigma, Vt = np.linalg.svd(k.head_block)
     # Cofactors from the singular values hold where the inverse does not exist.
     others = np.array([np.prod(np.delete(sigma, i)) for i in range(4)])

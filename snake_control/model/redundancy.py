@@ -25,7 +25,8 @@ class Kinematics:
     """The constraint matrix of one posture, cut up as the paper does.
 
     Rows: wheeled base links ascending, v_z, omega_x, omega_y. Columns of ``A_tilde`` and ``F_bar``:
-    w, H-SCPs, B-SCPs; of ``B_tilde``: theta_bar, rising.
+    w, H-SCPs, B-SCPs; of ``B_tilde``: theta_bar, rising. Shapes are those of a robot with a raised
+    head; a planar snake has no floor rows, and 3 instead of 6 columns for w.
 
     Attributes:
         s: index sets of the robot.
@@ -38,7 +39,7 @@ class Kinematics:
     @functools.cached_property
     def A_bar(self) -> Array:
         """Equation (3), (n_b - m_b + 3, 6)."""
-        return self.G[:, :6]
+        return self.G[:, self.s.w]
 
     @functools.cached_property
     def B_bar(self) -> Array:
@@ -59,7 +60,7 @@ class Kinematics:
     def head_block(self) -> Array:
         """Rows of B_tilde that only the head joints of theta_bar enter, 4 x 4.
 
-        Rows: the first base link's wheels (Assumption 5), then the floor.
+        Rows: the first base link's wheels (Assumption 5), then the floor. A planar snake has none.
         """
         return self.B_bar[np.ix_(self.s.head_rows, self.s.theta_h)]
 
@@ -73,22 +74,25 @@ class Kinematics:
         Raises:
             SingularError: the head block has no inverse.
         """
-        sigma = np.linalg.svd(self.head_block, compute_uv=False)[-1]
-        if not sigma > _SINGULAR:
-            raise SingularError("B_tilde", float(sigma))
-        F_head = np.linalg.solve(self.head_block, self.A_tilde[self.s.head_rows])
-        # The head block never sees a B-SCP; solve() would leave round-off there.
-        F_head[:, 6 + self.s.m_h :] = 0.0
-        rows = slice(1, len(self.s.wheeled))
-        right = self.A_tilde[rows] - self.B_bar[rows][:, self.s.theta_h] @ F_head
-        F_base = _substitute(self.B_bar[rows][:, self.s.theta_b], right)
+        s = self.s
+        F_head: Array = np.zeros((len(s.theta_h), len(s.w) + s.m))
+        if len(s.theta_h):
+            sigma = np.linalg.svd(self.head_block, compute_uv=False)[-1]
+            if not sigma > _SINGULAR:
+                raise SingularError("B_tilde", float(sigma))
+            F_head[:] = np.linalg.solve(self.head_block, self.A_tilde[s.head_rows])
+            # The head block never sees a B-SCP; solve() would leave round-off there.
+            F_head[:, len(s.w) + s.m_h :] = 0.0
+        rows = s.base_rows
+        right = self.A_tilde[rows] - self.B_bar[rows][:, s.theta_h] @ F_head
+        F_base = _substitute(self.B_bar[rows][:, s.theta_b], right)
         return np.vstack((F_head, F_base))
 
     @functools.cached_property
     def A_hat(self) -> Array:
         """Equation (11), (n - 1, 6 + m)."""
         s = self.s
-        lower = np.hstack((np.zeros((s.m, 6)), np.eye(s.m)))
+        lower = np.hstack((np.zeros((s.m, len(s.w))), np.eye(s.m)))
         return np.vstack((np.hstack((self.A_bar, np.zeros((len(self.G), s.m)))), lower))
 
     @functools.cached_property
@@ -103,8 +107,8 @@ class Kinematics:
     def E_tilde(self) -> Array:
         """Equations (17), (20): E_tilde = [I F_bar^T] T^T E, (6 + m, n - 1)."""
         s = self.s
-        E = np.zeros((6 + s.m, s.n - 1))
-        E[6 + np.arange(s.m), s.scp] = 1.0
+        E = np.zeros((len(s.w) + s.m, s.n - 1))
+        E[len(s.w) + np.arange(s.m), s.scp] = 1.0
         E[:, s.theta] = self.F_bar.T
         return E
 
@@ -129,7 +133,7 @@ def joint_velocities(k: Kinematics, w_dot: Array, phi_tilde_dot: Array) -> Array
 
     Args:
         k: kinematics of the posture.
-        w_dot: wanted head velocity, (6,) [m/s, rad/s].
+        w_dot: wanted velocity of w, (6,), or (3,) for a planar snake [m/s, rad/s].
         phi_tilde_dot: wanted SCP velocities, H-SCPs first, (m,) [rad/s].
 
     Returns:

@@ -29,8 +29,8 @@ def log_V_b1(
     Returns:
         log V_b1 (-inf in a singular posture, with a zero gradient), and its gradient (n + 5,).
     """
-    rows = len(k.G)
-    K = np.zeros((rows + 6, rows + 6))
+    rows, w = len(k.G), k.s.w
+    K = np.zeros((rows + len(w), rows + len(w)))
     K[:rows, :rows] = k.B_bar @ k.B_bar.T
     K[:rows, rows:] = k.A_bar
     K[rows:, :rows] = k.A_bar.T
@@ -38,9 +38,9 @@ def log_V_b1(
     if sign == 0.0:
         return -np.inf, np.zeros(len(g.q))
     inverse = np.linalg.inv(K)
-    weights = np.empty_like(k.G)
+    weights = np.zeros_like(k.G)
     # d log|det K| = <inverse, dK>; K is quadratic in B_bar = -G and linear in A_bar = G.
-    weights[:, :6] = 2.0 * inverse[:rows, rows:]
+    weights[:, w] = 2.0 * inverse[:rows, rows:]
     weights[:, 6:] = -2.0 * inverse[:rows, :rows] @ k.B_bar
     gradient = contracted_gradient(g, weights) - 2.0 * log_V_h_gradient
     return float(log_det - 2.0 * np.log(V_h)), gradient

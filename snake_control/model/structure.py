@@ -20,12 +20,17 @@ class Structure:
 
     Attributes:
         robot: the configuration.
-        n, n_h, n_b: numbers of links of the whole robot, the head part and the base part.
+        n, n_h, n_b: numbers of links of the whole robot, the head part and the base part. A planar
+            snake is all base: n_h = 0.
         m_h, m_b, m: numbers of H-SCPs, B-SCPs and all SCPs.
+        w: components of q that make the controlled w: all six, or x, y, Y of a planar snake.
         axes: unit vector of each joint's axis in the frame of the link before it, (n-1, 3).
-        wheeled: wheeled base links, counted from the first base link, (n_b - m_b,).
+        wheeled: wheeled base links, counted from the first base link, (n_b - m_b,); one less
+            where link 1 of a planar snake is wheelless and gives no B-SCP.
+        floor_rows: number of constraint rows of the floor: 3, or 0 for a planar snake.
         head_rows: constraint rows that only head joints enter: the first base link's wheels
-            (Assumption 5) and the floor, (4,).
+            (Assumption 5) and the floor, (4,); none for a planar snake.
+        base_rows: the other constraint rows, each with a base joint of its own in theta_b.
         scp_h, scp_b: joints that are H-SCPs and B-SCPs.
         theta_h, theta_b: all other joints of head and base; theta_bar is both in this order (9).
         behind: ``behind[k, a]`` is 1.0 if wheeled link k lies behind base joint a,
@@ -40,9 +45,12 @@ class Structure:
     m_h: int
     m_b: int
     m: int
+    w: Indices
     axes: Array
     wheeled: Indices
+    floor_rows: int
     head_rows: Indices
+    base_rows: slice
     scp_h: Indices
     scp_b: Indices
     theta_h: Indices
@@ -72,6 +80,7 @@ def structure(robot: RobotConfig) -> Structure:
     free = np.setdiff1d(joints, np.concatenate((scp_h, scp_b)))
     wheeled = np.array(robot.wheeled_links, dtype=np.intp) - n_h - 1
     unit = {"pitch": (0.0, 1.0, 0.0), "yaw": (0.0, 0.0, 1.0)}
+    wheels = len(wheeled)
     return Structure(
         robot=robot,
         n=n,
@@ -80,9 +89,12 @@ def structure(robot: RobotConfig) -> Structure:
         m_h=len(scp_h),
         m_b=len(scp_b),
         m=len(scp_h) + len(scp_b),
+        w=np.array(robot.controlled, dtype=np.intp),
         axes=np.array([unit[axis] for axis in robot.joint_axes]),
         wheeled=wheeled,
-        head_rows=np.concatenate(([0], len(wheeled) + np.arange(3))),
+        floor_rows=0 if robot.planar else 3,
+        head_rows=(np.arange(0) if robot.planar else np.concatenate(([0], wheels + np.arange(3)))),
+        base_rows=slice(0 if robot.planar else 1, wheels),
         scp_h=scp_h,
         scp_b=scp_b,
         theta_h=free[free < n_h],

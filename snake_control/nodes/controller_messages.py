@@ -30,6 +30,7 @@ class Step:
         status: ``ControllerState.STATUS_*``.
         text: the reason, naming the input, the joint or the limit.
         phi, w, w_d, w_d_dot: inputs as far as they could be used, else NaN.
+        controlled: components of w, from 0, that the controller moves (not all, if planar).
         result: what the control law decided; ``None`` if the joints are commanded to rest.
         joint_states_age, head_age, reference_age: ages of the inputs [s].
     """
@@ -41,6 +42,7 @@ class Step:
     w_d_dot: Array = dataclasses.field(default_factory=_nothing)
     status: int = ControllerState.STATUS_WAITING
     text: str = ""
+    controlled: tuple[int, ...] = (0, 1, 2, 3, 4, 5)
     result: ControlResult | None = None
     joint_states_age: float = math.inf
     head_age: float = math.inf
@@ -48,15 +50,21 @@ class Step:
 
     @property
     def error(self) -> Array:
-        """The error w - w_d, angles wrapped to +-pi, shape (6,) [m, rad]; NaN while unknown."""
-        error: Array = self.w - self.w_d
-        error[3:] = wrap(error[3:])
+        """The error w - w_d, angles wrapped to +-pi, shape (6,) [m, rad]; NaN while unknown.
+
+        Components that the controller does not move have none.
+        """
+        difference: Array = self.w - self.w_d
+        difference[3:] = wrap(difference[3:])
+        error = np.zeros(6)
+        controlled = list(self.controlled)
+        error[controlled] = difference[controlled]
         return error
 
     @staticmethod
     def at(stamp_ns: int, robot: RobotConfig) -> Step:
         """Return a step that knows nothing yet."""
-        return Step(stamp_ns, np.full(robot.joints, math.nan))
+        return Step(stamp_ns, np.full(robot.joints, math.nan), controlled=robot.controlled)
 
 
 def judge(step: Step, result: ControlResult, robot: RobotConfig) -> None:

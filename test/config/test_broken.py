@@ -15,6 +15,13 @@ PAPER_YAML = CONFIG / "paper_robot.yaml"
 YAW = "yaw"
 PITCH = "pitch"
 PAPER_AXES = [PITCH, YAW, PITCH, YAW, PITCH] + [YAW] * 6
+PLANAR = {
+    "links": 10,
+    "head_links": 0,
+    "wheelless_links": [1, 4, 7],
+    "head_scp_joints": [0],
+    "joint_axes": [YAW] * 9,
+}
 
 
 def broken(tmp_path: Path, text: str) -> Path:
@@ -86,6 +93,51 @@ CASES = {
         },
         "links",
         "or more",
+    ),
+    # Planar snakes.
+    "planar, condition 1": (
+        "robot",
+        PLANAR | {"wheelless_links": [1, 4, 10]},
+        "wheelless_links",
+        "Condition 1",
+    ),
+    "planar, steered by nothing": (
+        "robot",
+        PLANAR | {"wheelless_links": [4, 7]},
+        "wheelless_links",
+        "link 1 of a planar snake must have no wheels",
+    ),
+    "planar, condition 4, too few": (
+        "robot",
+        PLANAR | {"wheelless_links": [1]},
+        "wheelless_links",
+        "Condition 4 of a planar snake",
+    ),
+    "planar, condition 4, too many": (
+        "robot",
+        PLANAR | {"wheelless_links": [1, 2, 3, 4, 5, 6, 7]},
+        "wheelless_links",
+        "must be 2 to 6",
+    ),
+    "planar, condition 5": ("robot", PLANAR | {"head_links": 1}, "head_links", "Condition 5"),
+    "planar, assumption 2": (
+        "robot",
+        PLANAR | {"joint_axes": [PITCH] + [YAW] * 8},
+        "joint_axes",
+        "Assumption 2",
+    ),
+    "planar, H-SCP": ("robot", PLANAR | {"head_scp_joints": [3]}, "head_scp_joints", "give [0]"),
+    "planar, same link twice": (
+        "robot",
+        PLANAR | {"wheelless_links": [1, 4, 4]},
+        "wheelless_links",
+        "once",
+    ),
+    "planar, no such link": (
+        "robot",
+        PLANAR | {"wheelless_links": [1, 4, 11]},
+        "wheelless_links",
+        "1 to 9",
     ),
     # Values.
     "range beyond the servo": (

@@ -41,6 +41,16 @@ def test_scps_of_the_paper():
     assert robot.joint_names[-1] == "joint_11"
 
 
+def test_planar_snake():
+    config = load(CONFIG / "planar_snake.yaml")
+    assert config.robot.planar
+    assert config.robot.controlled == (0, 1, 5)
+    assert config.robot.scp_joints == config.robot.base_scp_joints == (3, 6)
+    assert config.robot.wheeled_links == (2, 3, 5, 6, 8, 9, 10)
+    # Case 1 given after it stops the SCPs: its weight a_b stands above a_prime.
+    assert load(CONFIG / "planar_snake.yaml", CONFIG / "case_1.yaml").controller.a_b == 0.0
+
+
 @pytest.mark.parametrize("case", [1, 2, 3])
 def test_case_files(case):
     controller = load(PAPER, CONFIG / f"case_{case}.yaml").controller

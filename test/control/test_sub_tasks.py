@@ -26,7 +26,7 @@ def test_26_head_cost_rises_by_its_own_scps(robot):
     k = posture.k
     phi_dot_hd = head_scp_velocities(posture, GAINS)
     assert phi_dot_hd.shape == (k.s.m_h,)
-    u = joint_velocities(k, np.zeros(6), np.concatenate((phi_dot_hd, np.zeros(k.s.m_b))))
+    u = joint_velocities(k, np.zeros(len(k.s.w)), np.concatenate((phi_dot_hd, np.zeros(k.s.m_b))))
     expected = phi_dot_hd @ phi_dot_hd / GAINS.a_h
     assert rate(posture.V_h_gradient, u) == pytest.approx(expected, rel=1e-9)
 
@@ -39,7 +39,7 @@ def test_28_base_cost_rises_by_its_own_scps(robot, a_prime, b_prime):
     k = posture.k
     phi_dot_bd = base_scp_velocities(posture, gains)
     assert phi_dot_bd.shape == (k.s.m_b,)
-    u = joint_velocities(k, np.zeros(6), np.concatenate((np.zeros(k.s.m_h), phi_dot_bd)))
+    u = joint_velocities(k, np.zeros(len(k.s.w)), np.concatenate((np.zeros(k.s.m_h), phi_dot_bd)))
     gradient = a_prime * posture.V_b1_gradient + b_prime * posture.support.gradient
     assert rate(gradient, u) == pytest.approx(phi_dot_bd @ phi_dot_bd / gains.a_b, rel=1e-7)
     assert rate(gradient, u) > 0
@@ -51,7 +51,7 @@ def test_base_scps_leave_the_head_cost_alone(robot):
     posture = Posture(robot, random_q(robot, 6))
     k = posture.k
     phi_dot_bd = base_scp_velocities(posture, GAINS)
-    u = joint_velocities(k, np.zeros(6), np.concatenate((np.zeros(k.s.m_h), phi_dot_bd)))
+    u = joint_velocities(k, np.zeros(len(k.s.w)), np.concatenate((np.zeros(k.s.m_h), phi_dot_bd)))
     np.testing.assert_array_equal(u[: k.s.n_h], 0.0)
     assert rate(posture.V_h_gradient, u) == pytest.approx(0.0, abs=1e-15)
 

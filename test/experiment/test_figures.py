@@ -12,6 +12,7 @@ from snake_control.experiment.figures import draw_all
 from snake_control.experiment.motion import motion, snapshot_steps
 from snake_control.experiment.series import Series
 from support.experiments import LONG_ROBOT, step
+from support.robots import ROBOTS
 
 ROBOT = RobotConfig()
 
@@ -29,7 +30,11 @@ def moving(robot: RobotConfig, fell_at_s: float | None = None, truth: bool = Tru
 
 @pytest.mark.parametrize(
     ("robot", "case", "head_pose"),
-    [(ROBOT, 3, "fig10_head_pose.png"), (LONG_ROBOT, 1, "fig08_head_pose.png")],
+    [
+        (ROBOT, 3, "fig10_head_pose.png"),
+        (LONG_ROBOT, 1, "fig08_head_pose.png"),
+        (ROBOTS["planar"], 2, "fig09_head_pose.png"),
+    ],
 )
 def test_all_figures_are_readable_pictures(robot, case, head_pose, tmp_path):
     paths = draw_all(moving(robot, fell_at_s=45.7), case, tmp_path)

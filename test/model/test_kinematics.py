@@ -48,6 +48,8 @@ def test_constraint_rows_are_velocities(robot):
     """G q_dot equals sideways, vertical and angular velocities of moved links (differences)."""
     q = random_q(robot, 11)
     q_dot = np.random.default_rng(3).normal(size=len(q))
+    if robot.planar:
+        q_dot[2:5] = 0.0
     h = 1e-5
     before, after = frames(robot, q - h * q_dot), frames(robot, q + h * q_dot)
     now = frames(robot, q)
@@ -58,10 +60,11 @@ def test_constraint_rows_are_velocities(robot):
         return (ends[1] - ends[0]) / (2 * h)
 
     expected = [now[link - 1][0][:, 1] @ center_velocity(link) for link in robot.wheeled_links]
-    first = robot.head_links + 1
-    expected.append(center_velocity(first)[2])
-    turn = after[first - 1][0] @ before[first - 1][0].T
-    expected.extend(Rotation.from_matrix(turn).as_rotvec()[:2] / (2 * h))
+    if not robot.planar:
+        first = robot.head_links + 1
+        expected.append(center_velocity(first)[2])
+        turn = after[first - 1][0] @ before[first - 1][0].T
+        expected.extend(Rotation.from_matrix(turn).as_rotvec()[:2] / (2 * h))
     found = constraint_matrix(geometry(robot, q)) @ q_dot
     np.testing.assert_allclose(found, expected, rtol=1e-7, atol=1e-8)
 
@@ -70,19 +73,41 @@ def test_constraint_rows_are_velocities(robot):
 def test_shapes_and_signs(robot):
     k = kinematics(geometry(robot, random_q(robot, 1)))
     s = structure(robot)
-    rows = s.n_b - s.m_b + 3
-    assert k.A_bar.shape == (rows, 6)
+    wheels, w = len(robot.wheeled_links), 3 if robot.planar else 6
+    rows = wheels if robot.planar else s.n_b - s.m_b + 3
+    assert k.A_bar.shape == (rows, w)
     assert k.B_bar.shape == (rows, s.n - 1)
-    assert k.A_tilde.shape == (rows, 6 + s.m)
+    assert k.A_tilde.shape == (rows, w + s.m)
     assert k.B_tilde.shape == (rows, rows) == (s.n - s.m - 1, s.n - s.m - 1)
-    assert k.F_bar.shape == (s.n - s.m - 1, 6 + s.m)
-    assert k.A_hat.shape == (s.n - 1, 6 + s.m)
+    assert k.F_bar.shape == (s.n - s.m - 1, w + s.m)
+    assert k.A_hat.shape == (s.n - 1, w + s.m)
     assert k.B_hat.shape == (s.n - 1, s.n - 1)
     # Equation (2): a wheeled link's own joint enters with half a link, floor rows with head joints.
-    np.testing.assert_array_equal(k.B_bar[-3:, s.n_h :], 0.0)
-    for row, link in enumerate(robot.wheeled_links[1:], start=1):
-        assert k.B_bar[row, link - 2] == pytest.approx(robot.half_length_m)
-        np.testing.assert_array_equal(k.B_bar[row, link - 1 :], 0.0)
+    np.testing.assert_array_equal(k.B_bar[wheels:, s.n_h :], 0.0)
+    for row, link in enumerate(robot.wheeled_links):
+        if link > robot.head_links + 1:
+            assert k.B_bar[row, link - 2] == pytest.approx(robot.half_length_m)
+            np.testing.assert_array_equal(k.B_bar[row, link - 1 :], 0.0)
+
+
+@pytest.mark.parametrize("name", [name for name in ROBOTS if name.startswith("planar")])
+def test_B_tilde_of_a_planar_snake_is_lower_triangular(name):
+    robot = ROBOTS[name]
+    k = kinematics(geometry(robot, random_q(robot, 1)))
+    np.testing.assert_array_equal(np.triu(k.B_tilde, 1), 0.0)
+    np.testing.assert_allclose(np.diag(k.B_tilde), robot.half_length_m)
+
+
+@pytest.mark.parametrize("name", [name for name in ROBOTS if name.startswith("planar")])
+def test_a_planar_snake_does_not_read_z_roll_and_pitch(name):
+    """Whatever a motion capture says of them: the robot lies on the floor."""
+    robot = ROBOTS[name]
+    q = random_q(robot, 1)
+    tilted = q + np.eye(len(q))[2:5].sum(axis=0)
+    np.testing.assert_array_equal(
+        kinematics(geometry(robot, tilted)).G, kinematics(geometry(robot, q)).G
+    )
+    np.testing.assert_array_equal(link_points(robot, tilted), link_points(robot, q))
 
 
 @ALL
@@ -92,9 +117,10 @@ def test_F_bar_solves_7_and_has_the_zero_block_of_10(robot):
     np.testing.assert_allclose(
         k.B_tilde @ k.F_bar, k.A_tilde, atol=1e-9 * max(1.0, np.abs(k.F_bar).max())
     )
-    np.testing.assert_array_equal(k.F_bar[: len(s.theta_h), 6 + s.m_h :], 0.0)
+    w = len(s.w)
+    np.testing.assert_array_equal(k.F_bar[: len(s.theta_h), w + s.m_h :], 0.0)
     if s.m_b:
-        assert np.abs(k.F_bar[len(s.theta_h) :, 6 + s.m_h :]).max() > 0.1
+        assert np.abs(k.F_bar[len(s.theta_h) :, w + s.m_h :]).max() > 0.1
 
 
 @ALL
@@ -103,7 +129,7 @@ def test_B_scps_never_move_joints_in_front(robot):
     k = kinematics(geometry(robot, random_q(robot, 4)))
     s = k.s
     for column, joint in enumerate(s.scp_b):
-        moved = s.theta[np.abs(k.F_bar[:, 6 + s.m_h + column]) > 1e-12]
+        moved = s.theta[np.abs(k.F_bar[:, len(s.w) + s.m_h + column]) > 1e-12]
         assert (moved > joint).all()
         assert len(moved) > 0
 
@@ -112,12 +138,12 @@ def test_B_scps_never_move_joints_in_front(robot):
 def test_control_input_fulfils_11(robot):
     k = kinematics(geometry(robot, random_q(robot, 5)))
     rng = np.random.default_rng(0)
-    w_dot, phi_tilde_dot = rng.normal(size=6), rng.normal(size=k.s.m)
+    w_dot, phi_tilde_dot = rng.normal(size=len(k.s.w)), rng.normal(size=k.s.m)
     u = joint_velocities(k, w_dot, phi_tilde_dot)
     w_tilde_dot = np.concatenate((w_dot, phi_tilde_dot))
     scale = np.abs(u).max()
     np.testing.assert_allclose(k.B_hat @ u, k.A_hat @ w_tilde_dot, atol=1e-10 * scale)
-    np.testing.assert_allclose(k.G @ np.concatenate((w_dot, u)), 0.0, atol=1e-10 * scale)
+    np.testing.assert_allclose(k.A_bar @ w_dot, k.B_bar @ u, atol=1e-10 * scale)
 
 
 def test_long_robot_keeps_F_bar():

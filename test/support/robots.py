@@ -44,13 +44,38 @@ ROBOTS = {
         joint_axes=("pitch", "yaw", "pitch", "yaw", "pitch") + ("yaw",) * 24,
         start_joint_angles_rad=(0.0,),
     ),
+    "planar": RobotConfig(
+        links=10,
+        head_links=0,
+        wheelless_links=(1, 4, 7),
+        head_scp_joints=(0,),
+        joint_axes=("yaw",) * 9,
+        start_joint_angles_rad=(0.0,),
+    ),
+    "planar, two wheelless links in front": RobotConfig(
+        links=13,
+        head_links=0,
+        wheelless_links=(1, 2, 6, 7, 11),
+        head_scp_joints=(0,),
+        joint_axes=("yaw",) * 12,
+        half_length_m=0.05,
+        wheel_offset_m=0.04,
+        wheel_radius_m=0.03,
+        link_mass_kg=tuple(0.05 + 0.01 * i for i in range(13)),
+        start_joint_angles_rad=(0.0,),
+    ),
 }
 
 
 def random_q(robot: RobotConfig, seed: int) -> np.ndarray:
-    """A posture away from singularities, base not necessarily level (gradients hold anywhere)."""
+    """A posture away from singularities, base not necessarily level (gradients hold anywhere).
+
+    A planar snake lies on the floor.
+    """
     rng = np.random.default_rng(seed)
     q = rng.uniform(-0.6, 0.6, robot.links + 5)
+    if robot.planar:
+        q[2:5] = (robot.wheel_radius_m, 0.0, 0.0)
     q[6 : 6 + robot.head_links] += 0.3 * np.sign(q[6 : 6 + robot.head_links])
     return q
 
