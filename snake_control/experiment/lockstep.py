@@ -1,25 +1,39 @@
-"""Controller and plant in lockstep: no ROS, no clock, the same result every time."""
+"""Controller, servos and plant in lockstep: no ROS, no clock, the same result every time."""
 
 from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Iterator
+from typing import Protocol
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from snake_control.control.reference import Reference
-from snake_control.control.scp_controller import ControlResult, ScpController
+from snake_control.control.scp_controller import ControlResult
+from snake_control.experiment.servos import PerfectServos, Servos
 from snake_control.plant.plant import Plant, PlantState
+
+Array = NDArray[np.float64]
+
+
+class Controller(Protocol):
+    """What decides, once each control cycle; ``ScpController`` and others of its kind."""
+
+    def step(
+        self, q: ArrayLike, q_dot: ArrayLike | None, reference: Reference, t: float
+    ) -> ControlResult:
+        """Return the command for a posture, and everything that led to it."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class LockstepSample:
-    """One step: what was measured and decided at time t, before the joints moved.
+    """One cycle: what was there, was measured and decided at time t, before the joints moved.
 
     Attributes:
         t: time [s].
         state: ground truth at t.
-        result: what the controller decided at t.
+        result: what the controller decided at t, on what it measured.
     """
 
     t: float
@@ -27,15 +41,41 @@ class LockstepSample:
     result: ControlResult
 
 
+class Unlimited:
+    """A controller whose commands are those of (22): no speed limit, no joint range.
+
+    The paper's law knows neither; together with perfect servos this is the paper's own model.
+    """
+
+    def __init__(self, controller: Controller) -> None:
+        """Take the limits off ``controller``."""
+        self._controller = controller
+
+    def step(
+        self, q: ArrayLike, q_dot: ArrayLike | None, reference: Reference, t: float
+    ) -> ControlResult:
+        """Return what the controller decides, as if no limit had bitten."""
+        result = self._controller.step(q, q_dot, reference, t)
+        return dataclasses.replace(
+            result,
+            u=result.u_unlimited,
+            speed_scale=1.0,
+            speed_limited=(),
+            range_limited=(),
+        )
+
+
 def lockstep(
     plant: Plant,
     state: PlantState,
-    controller: ScpController,
+    controller: Controller,
     reference: Callable[[float], Reference],
     duration_s: float,
     dt: float,
+    servos: Servos | None = None,
+    plant_steps: int = 1,
 ) -> Iterator[LockstepSample]:
-    """Run a controller against a plant whose joints follow exactly (perfect servos).
+    """Run a controller against a plant.
 
     Args:
         plant: the body, already reset.
@@ -43,19 +83,27 @@ def lockstep(
         controller: the controller.
         reference: wanted head pose at a time.
         duration_s: length of the run [s].
-        dt: control step and plant step [s].
+        dt: control cycle [s].
+        servos: what stands between controller and joints; perfect ones by default.
+        plant_steps: steps of the plant in each control cycle.
 
     Yields:
-        One sample for each step, the last one at ``duration_s``.
+        One sample for each cycle, the last one at ``duration_s``.
 
     Raises:
         SingularError: the controller met a posture it cannot answer.
     """
+    servos = PerfectServos() if servos is None else servos
+    servos.reset(state.phi)
     steps = round(duration_s / dt)
     for step in range(steps + 1):
         t = step * dt
-        q = np.concatenate((state.w, state.phi))
+        q = np.concatenate((state.w, servos.measure(state.phi)))
         q_dot = np.concatenate((np.zeros(6), state.phi_dot))
         result = controller.step(q, q_dot, reference(t), t)
         yield LockstepSample(t, state, result)
-        state = plant.step(result.u, dt)
+        if step == steps:
+            return
+        command = servos.command(result.u, state.phi, dt)
+        for _ in range(plant_steps):
+            state = plant.step(command, dt / plant_steps)

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from snake_control.config import TrajectoryGeneratorConfig
 from snake_control.control.reference import Reference
+from snake_control.trajectory.configured import configured_trajectory, needs_head
 from snake_control.trajectory.head_trajectory import HeadTrajectory
-from snake_control.trajectory.hold import Hold
 from snake_control.trajectory.line import Line
 from snake_control.trajectory.motion_limits import MotionLimits
 from snake_control.trajectory.teleop import HeadVelocityCommand, Teleop
@@ -85,19 +85,11 @@ class ReferenceSequence:
         """
         if self._trajectory is not None:
             return Outcome(False, "a reference is being followed already; call ~/stop first")
+        if needs_head(self._config) and head is None:
+            return Outcome(False, _NO_HEAD)
+        self._trajectory = configured_trajectory(self._config, head, self.motion_time(now))
         if self._config.trajectory == "hold":
-            if head is None:
-                return Outcome(False, _NO_HEAD)
-            self._trajectory = Hold(head)
             return Outcome(True, "holding the head where it is")
-        start_pose = np.array(self._config.start_pose)
-        if self._config.start_from == "head":
-            if head is None:
-                return Outcome(False, _NO_HEAD)
-            start_pose = head
-        self._trajectory = Line(
-            start_pose, self._config.velocity, self.motion_time(now), self._config.duration_s
-        )
         return Outcome(True, f"following the line from {self._config.start_from}")
 
     def stop(self, now: float) -> Outcome:
