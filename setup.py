@@ -6,11 +6,13 @@ from setuptools import find_packages, setup
 
 NAME = "snake_control"
 NODES = ("bus_driver", "pose_input", "scp_controller", "trajectory_generator", "mock_bus")
+COMMANDS = ("demo", "evaluate", "experiment")
 
 setup(
     name=NAME,
     version="0.1.0",
     packages=find_packages(include=[NAME, f"{NAME}.*"]),
+    package_data={NAME: ["experiment/*.j2"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
@@ -28,7 +30,7 @@ setup(
     entry_points={
         "console_scripts": [
             *(f"{node} = {NAME}.nodes.{node}:main" for node in NODES),
-            f"demo = {NAME}.cli.demo:main",
+            *(f"{command} = {NAME}.cli.{command}:main" for command in COMMANDS),
         ],
     },
 )

@@ -11,6 +11,7 @@ from typing import Any
 
 from snake_control.config import Config, load
 from snake_control.experiment.cases import CASES, case_files, config_directory
+from snake_control.experiment.parameters import configuration_parameters
 
 
 @dataclasses.dataclass(frozen=True)
@@ -76,7 +77,7 @@ class DemoArguments:
 
     def summary_parameters(self, config: Config) -> dict[str, Any]:
         """Return what the summary says about the parameters of the run."""
-        mock, trajectory = config.mock_bus, config.trajectory_generator
+        mock = config.mock_bus
         return {
             "seed": mock.seed,
             "mocap_rate_hz": mock.mocap_rate_hz,
@@ -84,14 +85,7 @@ class DemoArguments:
             "mocap_rotation_noise_rad": mock.mocap_rotation_noise_rad,
             "mocap_delay_s": mock.mocap_delay_s,
             "requested_duration_s": self.duration_s,
-            "K_1_s": list(config.controller.K),
-            "a_h": config.controller.a_h,
-            "a_b": config.controller.a_b,
-            "a_prime": config.controller.a_prime,
-            "b_prime_1_m": config.controller.b_prime,
-            "trajectory": trajectory.trajectory,
-            "trajectory_start_from": trajectory.start_from,
-            "trajectory_velocity_m_s_rad_s": list(trajectory.velocity),
+            **configuration_parameters(config),
             "params_files": [str(path) for path in self.params_files],
         }
 

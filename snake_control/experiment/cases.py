@@ -1,10 +1,12 @@
-"""The parameter files of the paper's experiment, in a checkout and in an installed package."""
+"""The parameter files of the paper's experiment, and configurations that are made of them."""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
 
+from snake_control.config import Config, load
 from snake_control.errors import ConfigFileError
 
 CASES = (1, 2, 3)
@@ -42,3 +44,19 @@ def case_files(case: int) -> list[Path]:
     """
     directory = config_directory()
     return [directory / _ROBOT, directory / f"case_{case}.yaml"]
+
+
+def load_case(params_files: Sequence[str | Path], case: int | None) -> Config:
+    """Return the configuration of files that a user gave, with a case of the paper.
+
+    Args:
+        params_files: ROS parameter files, later ones winning; none for the paper's robot.
+        case: preset of sub-tasks, 1..3, that wins over the files' own; ``None`` for theirs.
+
+    Raises:
+        ConfigError, ConfigFileError: as ``snake_control.config.load``.
+    """
+    files = list(params_files) or [config_directory() / _ROBOT]
+    if case is not None:
+        files.append(config_directory() / f"case_{case}.yaml")
+    return load(*files)

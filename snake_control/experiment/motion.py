@@ -49,7 +49,7 @@ def motion(series: Series) -> Figure:
     figure.suptitle("Motion of the robot")
     grid = figure.subplots(len(shown), 2, sharex=True, sharey="col", squeeze=False)
     for (above, side), i, chain in zip(grid, shown, points, strict=True):
-        _from_above(above, robot, q[i], chain)
+        _from_above(above, robot, q[i])
         _from_the_side(side, robot, chain)
         _paths(above, w[: i + 1], w_d, 1)
         _paths(side, w[: i + 1], w_d, 2)
@@ -79,20 +79,25 @@ def _paths(axes: Axes, w: Array, w_d: Array, vertical: int) -> None:
     axes.plot(w[:, 0], w[:, vertical], color=style.ORANGE, linewidth=1.0, zorder=4)
 
 
-def _from_above(axes: Axes, robot: RobotConfig, q: Array, chain: Array) -> None:
-    g = geometry(robot, q)
-    stand = support(g)
-    axes.add_patch(
-        Polygon(stand.polygon, facecolor=f"{style.GREEN}26", edgecolor=style.GREEN, linewidth=0.7)
-    )
+def draw_from_above(axes: Axes, robot: RobotConfig, q: Array) -> None:
+    """Draw links and wheels at a posture q, (n + 5,), seen from above."""
+    chain = link_points(robot, q)
     radius = robot.wheel_radius_m
-    for link, pair in zip(robot.wheeled_links, wheel_contacts(g), strict=True):
+    for link, pair in zip(robot.wheeled_links, wheel_contacts(geometry(robot, q)), strict=True):
         along = chain[link - 1, :2] - chain[link, :2]
         along *= radius / np.hypot(*along)
         for contact in pair:
             axes.plot(*np.stack((contact - along, contact + along)).T, color="#222222", lw=1.8)
         axes.plot(*pair.T, color="#888888", lw=0.8)
     _chain(axes, robot, chain[:, :2])
+
+
+def _from_above(axes: Axes, robot: RobotConfig, q: Array) -> None:
+    stand = support(geometry(robot, q))
+    axes.add_patch(
+        Polygon(stand.polygon, facecolor=f"{style.GREEN}26", edgecolor=style.GREEN, linewidth=0.7)
+    )
+    draw_from_above(axes, robot, q)
     axes.plot(*stand.center_of_mass, "P", color=style.PURPLE, markersize=6, zorder=5)
 
 

@@ -54,16 +54,16 @@ def test_all_figures_are_readable_pictures(robot, case, head_pose, tmp_path):
 
 def test_scps_and_dependent_joints_follow_the_robot():
     series = moving(LONG_ROBOT)
-    upper, _ = figures.scps(series, None).get_axes()
+    upper, _ = figures.scps(series).get_axes()
     assert _legend(upper) == [rf"$\phi_{{{joint}}}$" for joint in (2, 3, 7, 9, 11, 13)]
-    head, base = figures.theta_bar(series, None).get_axes()
+    head, base = figures.theta_bar(series).get_axes()
     assert _legend(head) == [rf"$\phi_{{{joint}}}$" for joint in (1, 4, 5, 6)]
     assert _legend(base) == [rf"$\phi_{{{joint}}}$" for joint in (8, 10, 12, 14, 15)]
     np.testing.assert_array_equal(upper.get_lines()[0].get_ydata(), series.numbers("phi")[:, 1])
 
 
 def test_reference_is_broken_and_the_fall_marked_in_every_panel():
-    figure = figures.head_pose(moving(ROBOT), 45.0)
+    figure = figures.head_pose(moving(ROBOT, fell_at_s=45.0))
     for axes in figure.get_axes():
         w, w_d, fall = axes.get_lines()
         assert (w.get_linestyle(), w_d.get_linestyle()) == ("-", "--")
@@ -71,7 +71,7 @@ def test_reference_is_broken_and_the_fall_marked_in_every_panel():
 
 
 def test_d_min_is_in_millimetres():
-    _, lower = figures.base_costs(moving(ROBOT), None).get_axes()
+    _, lower = figures.base_costs(moving(ROBOT)).get_axes()
     assert np.max(lower.get_lines()[0].get_ydata()) == pytest.approx(30.0)
 
 
@@ -85,7 +85,7 @@ def test_motion_shows_as_many_moments_as_there_are():
 
 def test_series_without_ground_truth_shows_what_was_measured():
     series = moving(ROBOT, truth=False)
-    _, lower = figures.base_costs(series, None).get_axes()
+    _, lower = figures.base_costs(series).get_axes()
     assert lower.get_legend() is None
     assert len(lower.get_lines()) == 2  # d_min and the floor of it
     assert len(motion(series).get_axes()) == 14

@@ -11,6 +11,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 NODES = {"bus_driver", "pose_input", "scp_controller", "trajectory_generator", "mock_bus"}
+COMMANDS = {"demo", "evaluate", "experiment"}
 
 
 def _console_scripts() -> dict[str, str]:
@@ -25,7 +26,7 @@ def _console_scripts() -> dict[str, str]:
 
 
 def test_the_fixed_names_are_there():
-    assert set(_console_scripts()) == NODES | {"demo"}
+    assert set(_console_scripts()) == NODES | COMMANDS
 
 
 @pytest.mark.parametrize(("name", "target"), sorted(_console_scripts().items()))

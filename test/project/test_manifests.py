@@ -13,6 +13,7 @@ OURS = {"snake_control", "support", "benchmarks"}
 # module: key of rosdep, where the two differ
 KEYS = {
     "hypothesis": "python3-hypothesis",
+    "jinja2": "python3-jinja2",
     "matplotlib": "python3-matplotlib",
     "numpy": "python3-numpy",
     "pytest": "python3-pytest",

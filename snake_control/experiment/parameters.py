@@ -1,0 +1,22 @@
+"""What a summary says about the configuration of a run."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from snake_control.config import Config
+
+
+def configuration_parameters(config: Config) -> dict[str, Any]:
+    """Return gains, weights and trajectory of a configuration, units in the names."""
+    controller, trajectory = config.controller, config.trajectory_generator
+    return {
+        "K_1_s": list(controller.K),
+        "a_h": controller.a_h,
+        "a_b": controller.a_b,
+        "a_prime": controller.a_prime,
+        "b_prime_1_m": controller.b_prime,
+        "trajectory": trajectory.trajectory,
+        "trajectory_start_from": trajectory.start_from,
+        "trajectory_velocity_m_s_rad_s": list(trajectory.velocity),
+    }

@@ -1,0 +1,176 @@
+"""One case of the experiment in lockstep, recorded as the demo's runs are."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from snake_control.config import Config
+from snake_control.control.scp_controller import ScpController
+from snake_control.errors import SingularError
+from snake_control.experiment.lockstep import Controller, LockstepSample, Unlimited, lockstep
+from snake_control.experiment.parameters import configuration_parameters
+from snake_control.experiment.series import Series, Step
+from snake_control.experiment.servos import LimitedServos, PerfectServos, Servos
+from snake_control.experiment.summary import Run, summarise
+from snake_control.plant.kinematic import KinematicPlant
+from snake_control.trajectory.configured import configured_trajectory
+
+SERVOS = ("perfect", "limited")
+AFTER_FALL_S = 2.0
+"""A run goes on for this long after the robot fell, so that figures show the fall."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Settings:
+    """How a run is made.
+
+    Attributes:
+        duration_s: length of the run [s].
+        rate_hz: control cycles per second.
+        plant_step_s: longest step of the plant [s].
+        servos: ``perfect`` or ``limited``.
+        carry_remainder: whether limited servos carry what rounding a speed leaves.
+    """
+
+    duration_s: float = 60.0
+    rate_hz: float = 50.0
+    plant_step_s: float = 0.005
+    servos: str = "perfect"
+    carry_remainder: bool = True
+
+    @property
+    def plant_steps(self) -> int:
+        """Steps of the plant in each control cycle."""
+        return max(1, math.ceil(1.0 / (self.rate_hz * self.plant_step_s) - 1e-9))
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """What a summary says about these settings."""
+        limited = self.servos == "limited"
+        return {
+            "servos": self.servos,
+            "carry_remainder": self.carry_remainder if limited else None,
+            "control_rate_hz": self.rate_hz,
+            "plant_steps_per_cycle": self.plant_steps,
+            "requested_duration_s": self.duration_s,
+        }
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class CaseRun:
+    """A finished run.
+
+    Attributes:
+        case: preset of sub-tasks, 1..3.
+        config: everything it was configured with.
+        settings: how it was made.
+        series: one row for each control cycle.
+        summary: ready for JSON.
+        interrupted: whether somebody ended it early.
+    """
+
+    case: int
+    config: Config
+    settings: Settings
+    series: Series
+    summary: Mapping[str, Any]
+    interrupted: bool
+
+
+def run_case(
+    config: Config,
+    settings: Settings,
+    csv: Path | None = None,
+    on_step: Callable[[Step], bool] = lambda step: True,
+) -> CaseRun:
+    """Run one case to its end: the duration, a fall, or a posture without an answer.
+
+    Args:
+        config: robot, controller (with its case) and trajectory.
+        settings: how to run it.
+        csv: file of the series, written as it grows; none by default.
+        on_step: called with every row; when it returns False, the run ends there.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    series = Series(config.robot, csv)
+    ended, interrupted, fell_at_s = "duration reached", False, None
+    try:
+        for sample in _samples(config, settings):
+            step = step_of(sample)
+            series.append(step)
+            if not on_step(step):
+                ended, interrupted = f"interrupted at {step.t_s:.2f} s", True
+                break
+            if step.fallen and fell_at_s is None:
+                fell_at_s = step.t_s
+            if fell_at_s is not None and step.t_s >= fell_at_s + AFTER_FALL_S:
+                ended = f"the robot fell at {fell_at_s:.1f} s"
+                break
+    except SingularError as error:
+        ended = f"no answer after {len(series) / settings.rate_hz:.2f} s: {error}"
+    finally:
+        series.close()
+    case = config.controller.case
+    run = Run(
+        case=case,
+        K=config.controller.K,
+        ended=ended,
+        parameters={**settings.parameters, **configuration_parameters(config)},
+    )
+    return CaseRun(case, config, settings, series, summarise(series, run), interrupted)
+
+
+def step_of(sample: LockstepSample) -> Step:
+    """Return the row of a sample; nobody timed it, and there is no bus."""
+    state, result = sample.state, sample.result
+    limited = result.speed_scale < 1.0 or bool(result.range_limited)
+    return Step(
+        t_s=sample.t,
+        status="limited" if limited else "tracking",
+        w_measured=result.w,
+        w_d=result.w_d,
+        phi_measured=result.phi,
+        u_unlimited=result.u_unlimited,
+        u=result.u,
+        phi_tilde_dot_d=result.phi_tilde_dot_d,
+        speed_scale=result.speed_scale,
+        speed_limited=result.speed_limited,
+        range_limited=result.range_limited,
+        V_h=result.V_h,
+        V_b1=result.V_b1,
+        d_min=result.d_min,
+        sigma_min_B_tilde=result.sigma_min_B_tilde,
+        sigma_min_A_hat=result.sigma_min_A_hat,
+        w=state.w,
+        phi=state.phi,
+        d_min_true=state.d_min,
+        fallen=state.fallen,
+        slip=state.slip,
+    )
+
+
+def _samples(config: Config, settings: Settings) -> Iterator[LockstepSample]:
+    robot = config.robot
+    plant = KinematicPlant(robot)
+    state = plant.reset(robot.start_joint_angles_rad)
+    controller: Controller = ScpController(robot, config.controller)
+    servos: Servos = LimitedServos(robot, settings.carry_remainder)
+    if settings.servos == "perfect":
+        controller, servos = Unlimited(controller), PerfectServos()
+    trajectory = configured_trajectory(config.trajectory_generator, state.w)
+    return lockstep(
+        plant,
+        state,
+        controller,
+        trajectory.sample,
+        settings.duration_s,
+        1.0 / settings.rate_hz,
+        servos,
+        settings.plant_steps,
+    )
