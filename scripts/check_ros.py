@@ -15,6 +15,7 @@ NEEDED = {
     "diagnostic_msgs": "ros-jazzy-diagnostic-msgs",
     "visualization_msgs": "ros-jazzy-visualization-msgs",
     "dynamixel_sdk": "ros-jazzy-dynamixel-sdk",
+    "pinocchio": "ros-jazzy-pinocchio",
     "rosidl_generator_py": "ros-jazzy-rosidl-default-generators",
     "numpy": "python3-numpy",
     "scipy": "python3-scipy",

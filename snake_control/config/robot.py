@@ -68,6 +68,25 @@ class RobotConfig:
     link_mass_kg: tuple[float, ...] = parameter(
         (0.1,), "mass of each link, or one for all [kg]", low=1e-6, high=1e3
     )
+    link_size_m: tuple[float, ...] = parameter(
+        (0.05, 0.032),
+        "width and height of each link, a uniform box of length 2 l with its centre of mass in its "
+        "middle [m]",
+        low=1e-4,
+        high=10.0,
+    )
+    joint_friction: tuple[float, ...] = parameter(
+        (0.0,),
+        "viscous friction of each joint, or one for all [N m s/rad]",
+        low=0.0,
+        high=1e3,
+    )
+    joint_torque_limits_n_m: tuple[float, ...] = parameter(
+        (1.5,),
+        "largest torque of each joint, or one for all (an AX-12 stalls at 1.5) [N m]",
+        low=1e-3,
+        high=1e3,
+    )
     joint_limits_rad: tuple[float, ...] = parameter(
         (2.6,),
         "largest angle of each joint to both sides, or one for all; or lower and upper bound of "
@@ -104,6 +123,12 @@ class RobotConfig:
             )
         if len(masses) == 1:
             object.__setattr__(self, "link_mass_kg", masses * self.links)
+        if len(self.link_size_m) != 2:
+            raise ConfigError(
+                "robot.link_size_m", list(self.link_size_m), "give two sizes: width and height"
+            )
+        self._set_per_joint("joint_friction")
+        self._set_per_joint("joint_torque_limits_n_m")
         self._set_per_joint("joint_speed_limits_rad_s")
         self._set_per_joint("start_joint_angles_rad")
         self._check_limits()
@@ -299,6 +324,22 @@ class ControllerConfig:
         high=100.0,
         run_time=True,
     )
+    K_p: tuple[float, ...] = parameter(
+        (4.0,),
+        "torque control (21): gain on the error of x_h, y_h, z_h, R, P, Y, or one for all [1/s^2]; "
+        "zeros for the SCPs may follow",
+        low=0.0,
+        high=1e6,
+        run_time=True,
+    )
+    K_v: tuple[float, ...] = parameter(
+        (4.0,),
+        "torque control (21): gain on the velocity error of x_h, y_h, z_h, R, P, Y and each SCP, "
+        "or one for all [1/s]",
+        low=0.0,
+        high=1e6,
+        run_time=True,
+    )
     a_h: float = parameter(
         None,
         "gain of the H-SCP sub-task (25); default from the case",
@@ -335,18 +376,27 @@ class ControllerConfig:
 
     @staticmethod
     def for_scps(config: ControllerConfig, m: int) -> ControllerConfig:
-        """Return ``config`` with K cut to its six entries, checked against ``m`` SCPs.
+        """Return ``config`` with K and K_p cut to w, checked against ``m`` SCPs.
 
         Raises:
-            ConfigError: K has another length than 6 or 6 + m, or feeds back an SCP angle.
+            ConfigError: another number of gains, or one that feeds back an SCP angle.
         """
-        K = config.K
-        if len(K) not in (6, 6 + m):
-            raise ConfigError("controller.K", list(K), f"give 6 gains, or 6 + m = {6 + m}")
-        if any(K[6:]):
+        if len(config.K_v) not in (1, 6 + m):
             raise ConfigError(
-                "controller.K",
-                list(K),
-                "the gains of the SCPs must be 0: (25) and (27) give them velocities, not angles",
+                "controller.K_v", list(config.K_v), f"give one gain for all, or 6 + m = {6 + m}"
             )
-        return dataclasses.replace(config, K=K[:6])
+        K_p = config.K_p if len(config.K_p) == 1 else _of_w("controller.K_p", config.K_p, m)
+        return dataclasses.replace(config, K=_of_w("controller.K", config.K, m), K_p=K_p)
+
+
+def _of_w(field: str, gains: tuple[float, ...], m: int) -> tuple[float, ...]:
+    """Return the six gains of w; those of the ``m`` SCPs, where given, must be 0."""
+    if len(gains) not in (6, 6 + m):
+        raise ConfigError(field, list(gains), f"give 6 gains, or 6 + m = {6 + m}")
+    if any(gains[6:]):
+        raise ConfigError(
+            field,
+            list(gains),
+            "the gains of the SCPs must be 0: (25) and (27) give them velocities, not angles",
+        )
+    return gains[:6]

@@ -99,7 +99,7 @@ def lockstep(
     for step in range(steps + 1):
         t = step * dt
         q = np.concatenate((state.w, servos.measure(state.phi)))
-        q_dot = np.concatenate((np.zeros(6), state.phi_dot))
+        q_dot = np.concatenate((state.w_dot, state.phi_dot))
         result = controller.step(q, q_dot, reference(t), t)
         yield LockstepSample(t, state, result)
         if step == steps:

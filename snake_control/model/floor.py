@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from snake_control.config import RobotConfig
 from snake_control.model.geometry import Geometry, geometry, link_centers
-from snake_control.model.rotation import rotation_from_rpy, rpy_from_rotation
+from snake_control.model.rotation import cross, rotation_from_rpy, rpy_from_rotation, rpy_rates
 
 Array = NDArray[np.float64]
 
@@ -33,6 +33,50 @@ def head_pose_on_floor(robot: RobotConfig, phi: ArrayLike, base: ArrayLike) -> A
     from_tip = at_origin.base_origin - at_origin.head_points[0]
     tip = np.array([x, y, robot.wheel_radius_m]) - rotation @ from_tip
     return np.concatenate((tip, rpy_from_rotation(rotation)))
+
+
+def base_under_head(robot: RobotConfig, phi: ArrayLike, w: ArrayLike) -> Array:
+    """Return where the base must stand for the head to have x_h, y_h and Y of ``w``.
+
+    The inverse of ``head_pose_on_floor``; the floor decides the rest of the head pose.
+
+    Args:
+        robot: the robot.
+        phi: joint angles, (n-1,) [rad].
+        w: wanted head pose, (6,) [m, rad].
+
+    Returns:
+        [x, y, yaw] of the front end of link n_h + 1, (3,) [m, rad].
+    """
+    wanted = np.asarray(w, dtype=float)
+    # Turn and shift a robot whose base stands at the origin.
+    at_origin = head_pose_on_floor(robot, phi, np.zeros(3))
+    yaw = wanted[5] - at_origin[5]
+    c, s = math.cos(yaw), math.sin(yaw)
+    x = wanted[0] - (c * at_origin[0] - s * at_origin[1])
+    y = wanted[1] - (s * at_origin[0] + c * at_origin[1])
+    return np.array([x, y, yaw])
+
+
+def head_velocity(g: Geometry, base_rate: ArrayLike, phi_dot: ArrayLike) -> Array:
+    """Return w_dot of a robot whose base glides on the floor, (6,) [m/s, rad/s].
+
+    The rates of R and Y grow beyond all bounds towards P = +-pi/2.
+
+    Args:
+        g: the posture.
+        base_rate: rate of [x, y, yaw] of the front end of link n_h + 1, (3,) [m/s, rad/s].
+        phi_dot: joint velocities, (n-1,) [rad/s].
+    """
+    x_dot, y_dot, yaw_dot = np.asarray(base_rate, dtype=float)
+    # Head joint i turns all in front of it backwards.
+    turning = -g.head_axes.T * np.asarray(phi_dot, dtype=float)[: g.s.n_h]
+    angular = turning.sum(axis=1) + np.array([0.0, 0.0, yaw_dot])
+    tip = g.head_points[0]
+    linear = np.array([x_dot, y_dot, 0.0])
+    linear += cross(np.array([[0.0], [0.0], [yaw_dot]]), (tip - g.base_origin)[:, None])[:, 0]
+    linear += cross(turning, (tip - g.head_points[1:]).T).sum(axis=1)
+    return np.concatenate((linear, rpy_rates(g.q[3:6], angular)))
 
 
 def base_pose(g: Geometry) -> Array:

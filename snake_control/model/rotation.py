@@ -106,3 +106,26 @@ def cross(a: Array, b: Array) -> Array:
     return np.stack(
         (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
     )
+
+
+def rpy_rates(rpy: ArrayLike, angular: ArrayLike) -> Array:
+    """Return the rates of [R, P, Y] at an angular velocity in the world, (3,) [rad/s].
+
+    The inverse of ``rpy_rate_map``; at P = +-pi/2, where there is none, huge but finite numbers.
+
+    Args:
+        rpy: roll, pitch, yaw [rad], (3,).
+        angular: angular velocity in the world, (3,) [rad/s].
+    """
+    _, pitch, yaw = (float(angle) for angle in np.asarray(rpy, dtype=float))
+    x, y, z = (float(component) for component in np.asarray(angular, dtype=float))
+    forward = math.cos(yaw) * x + math.sin(yaw) * y
+    # The cosine of no double is 0.
+    roll_rate = forward / math.cos(pitch)
+    return np.array(
+        [
+            roll_rate,
+            math.cos(yaw) * y - math.sin(yaw) * x,
+            z + math.sin(pitch) * roll_rate,
+        ]
+    )

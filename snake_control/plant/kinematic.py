@@ -10,7 +10,12 @@ from numpy.typing import ArrayLike, NDArray
 from snake_control.config import RobotConfig
 from snake_control.errors import ModelError
 from snake_control.model.constraints import lateral_joint_map, lateral_map
-from snake_control.model.floor import gravity_efforts, head_pose_on_floor
+from snake_control.model.floor import (
+    base_under_head,
+    gravity_efforts,
+    head_pose_on_floor,
+    head_velocity,
+)
 from snake_control.model.geometry import geometry, planar_base
 from snake_control.model.stability import support
 from snake_control.model.structure import structure
@@ -37,15 +42,9 @@ class KinematicPlant:
         """Put the robot on the floor; see ``Plant.reset``."""
         self._phi = self._checked("phi", phi).copy()
         wanted = np.zeros(6) if w is None else np.asarray(w, dtype=float)
-        # Turn and shift a robot whose base stands at the origin to where the head shall be.
-        at_origin = head_pose_on_floor(self._robot, self._phi, np.zeros(3))
-        yaw = wanted[5] - at_origin[5]
-        c, s = math.cos(yaw), math.sin(yaw)
-        x = wanted[0] - (c * at_origin[0] - s * at_origin[1])
-        y = wanted[1] - (s * at_origin[0] + c * at_origin[1])
-        self._base = np.array([x, y, yaw])
+        self._base = base_under_head(self._robot, self._phi, wanted)
         self._fallen = False
-        return self._state(np.zeros(self._s.n - 1), np.zeros(len(self._s.wheeled)))
+        return self._state(np.zeros(3), np.zeros(self._s.n - 1), np.zeros(len(self._s.wheeled)))
 
     def step(self, joint_command: ArrayLike, dt: float) -> PlantState:
         """Advance by ``dt`` seconds at constant joint velocities; see ``Plant.step``.
@@ -61,7 +60,7 @@ class KinematicPlant:
         )
         self._base = self._base + dt * planar
         self._phi = self._phi + dt * phi_dot
-        return self._state(phi_dot, slip)
+        return self._state(planar, phi_dot, slip)
 
     def _base_velocity(self, phi: Array, base: Array, phi_dot: Array) -> tuple[Array, Array]:
         """Return the rate of [x, y, yaw] of the base, and the slip of each wheeled link."""
@@ -74,13 +73,14 @@ class KinematicPlant:
         rate = np.array([c * twist[0] - si * twist[1], si * twist[0] + c * twist[1], twist[2]])
         return rate, rows @ twist + by_joints
 
-    def _state(self, phi_dot: Array, slip: Array) -> PlantState:
+    def _state(self, planar: Array, phi_dot: Array, slip: Array) -> PlantState:
         w = head_pose_on_floor(self._robot, self._phi, self._base)
         g = geometry(self._robot, np.concatenate((w, self._phi)))
         d_min = support(g).d_min
         self._fallen |= d_min < 0
         return PlantState(
             w=w,
+            w_dot=head_velocity(g, planar, phi_dot),
             phi=self._phi.copy(),
             phi_dot=phi_dot.copy(),
             effort=gravity_efforts(g),

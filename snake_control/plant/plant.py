@@ -17,6 +17,7 @@ class PlantState:
 
     Attributes:
         w: head pose [x_h, y_h, z_h, R, P, Y], (6,) [m, rad].
+        w_dot: its rate, (6,) [m/s, rad/s].
         phi: joint angles, (n-1,) [rad].
         phi_dot: joint velocities, (n-1,) [rad/s].
         effort: torque each joint's servo has to apply, (n-1,) [N m].
@@ -26,6 +27,7 @@ class PlantState:
     """
 
     w: Array
+    w_dot: Array
     phi: Array
     phi_dot: Array
     effort: Array

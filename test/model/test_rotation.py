@@ -12,6 +12,7 @@ from snake_control.model.rotation import (
     rpy_from_quaternion,
     rpy_from_rotation,
     rpy_rate_map,
+    rpy_rates,
     unwrap_near,
     wrap,
 )
@@ -36,6 +37,11 @@ def test_rate_map_is_the_derivative(roll, tilt, yaw, rate):
     turn = rotation_from_rpy(rpy + h * rate) @ rotation_from_rpy(rpy - h * rate).T
     omega = Rotation.from_matrix(turn).as_rotvec() / (2 * h)
     np.testing.assert_allclose(rpy_rate_map(rpy) @ rate, omega, atol=1e-7)
+    np.testing.assert_allclose(rpy_rates(rpy, rpy_rate_map(rpy) @ rate), rate, atol=1e-11)
+
+
+def test_rates_at_the_vertical_are_finite():
+    assert np.isfinite(rpy_rates([0.3, np.pi / 2, 0.4], [0.1, 0.2, 0.3])).all()
 
 
 def test_pitch_down_is_positive():

@@ -42,6 +42,7 @@ def test_consistent_velocities_move_the_head_as_wanted_without_slip(robot):
     after = plant.step(u, dt)
     # The slip left over is that of the step's midpoint, where the constraints have moved on a bit.
     np.testing.assert_allclose((after.w - before.w) / dt, w_dot, atol=1e-3)
+    np.testing.assert_allclose(after.w_dot, w_dot, atol=1e-3)
     assert np.abs(after.slip).max() < 1e-3
     np.testing.assert_allclose(after.phi, before.phi + dt * u)
 

@@ -1,0 +1,172 @@
+"""The plant with inertia, against mechanics' own laws and against (20), which it does not use."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from snake_control.errors import ModelError
+from snake_control.model.dynamics import Dynamics
+from snake_control.model.floor import head_pose_on_floor
+from snake_control.model.geometry import geometry, link_centers
+from snake_control.model.posture import Posture
+from snake_control.model.selection import selection
+from snake_control.plant.kinematic import KinematicPlant
+from snake_control.plant.torque import TorquePlant
+from support.mechanics import along
+from support.robots import PAPER, ROBOTS, random_q
+
+ALL = pytest.mark.parametrize("robot", list(ROBOTS.values()), ids=list(ROBOTS))
+
+
+def moving(robot, seed):
+    """A plant in motion, and joint torques."""
+    plant = TorquePlant(robot)
+    phi_dot, tau = np.random.default_rng(seed).uniform(-1, 1, (2, robot.joints))
+    state = plant.reset(random_q(robot, seed)[6:], phi_dot=phi_dot)
+    return plant, state, 0.05 * tau
+
+
+def simulate(plant, tau, duration_s, rtol=1e-10):
+    """Integrate the plant's accelerations with a method of order 8; return p and v at the end."""
+    half = len(plant.p)
+
+    def rate(_, state):
+        return np.concatenate(
+            (state[half:], plant.acceleration(state[:half], state[half:], tau)[0])
+        )
+
+    start = np.concatenate((plant.p, plant.v))
+    found = solve_ivp(rate, (0, duration_s), start, method="DOP853", rtol=rtol, atol=1e-3 * rtol)
+    return found.y[:half, -1], found.y[half:, -1]
+
+
+@ALL
+def test_reset_stands_where_the_kinematic_plant_does(robot):
+    phi = random_q(robot, 3)[6:]
+    w = np.array([0.4, -0.3, 9.0, 9.0, 9.0, 0.8])
+    state, expected = TorquePlant(robot).reset(phi, w), KinematicPlant(robot).reset(phi, w)
+    np.testing.assert_allclose(state.w, expected.w, atol=1e-12)
+    assert state.d_min == pytest.approx(expected.d_min, abs=1e-12)
+    np.testing.assert_array_equal(state.w_dot, 0.0)
+    np.testing.assert_array_equal(state.phi, phi)
+
+
+@ALL
+def test_it_moves_as_the_reduced_dynamics_say(robot):
+    """M_tilde w_tilde_ddot + h_tilde = E_tilde tau along the simulation, to 1e-8."""
+    plant, state, tau = moving(robot, 5)
+    dynamics = Dynamics(robot)
+    s = Posture(robot, np.zeros(robot.links + 5)).g.s
+    S, _ = selection(s)
+    for _ in range(5):
+        p, v = plant.p, plant.v
+        a, _ = plant.acceleration(p, v, tau)
+
+        def q_dot(t, p=p, v=v, a=a):
+            return np.concatenate(
+                (plant._body.head(p + t * v + 0.5 * t * t * a, v + t * a)[1], v[3:] + t * a[3:])
+            )
+
+        q_ddot = along(lambda t: q_dot(t[0]), np.zeros(1), np.ones(1), 5e-5)
+        posture = Posture(robot, np.concatenate((state.w, state.phi)))
+        reduced = dynamics.reduced(posture, q_dot(0.0))
+        inertia, drive = reduced.M_tilde @ q_ddot[S], reduced.E_tilde @ tau
+        scale = np.abs((inertia, reduced.h_tilde, drive)).max()
+        np.testing.assert_allclose(inertia + reduced.h_tilde, drive, atol=1e-8 * scale)
+        state = plant.step(tau, 0.01)
+
+
+def test_energy_is_conserved_while_the_head_swings():
+    plant = TorquePlant(PAPER)
+    state = plant.reset(PAPER.start_joint_angles_rad)
+    p, v = simulate(plant, np.zeros(11), 5.0)
+    assert plant._body.energy(p, v) == pytest.approx(state.energy, rel=1e-6)
+    assert plant._body.energy(p, 0 * v) < state.energy - 0.05
+    assert np.abs(plant._body.dynamics(p, v).wheel_rows @ v).max() < 1e-6
+
+
+def test_friction_takes_and_torques_give_energy():
+    robot = dataclasses.replace(PAPER, joint_friction=(0.05,))
+    plant, state, tau = moving(robot, 2)
+    work, dt = 0.0, 2e-4
+    for _ in range(250):
+        before = state.phi_dot
+        state = plant.step(tau, dt)
+        middle = 0.5 * (before + state.phi_dot)
+        work += dt * middle @ (tau - 0.05 * middle)
+    start = moving(robot, 2)[1].energy
+    assert state.energy - start == pytest.approx(work, rel=1e-3)
+
+
+@ALL
+def test_wheels_carry_what_the_centre_of_mass_asks_for(robot):
+    """Newton's law seen from above: nothing but the wheels pushes sideways."""
+    plant, state, tau = moving(robot, 4)
+    p, v = plant.p, plant.v
+    a, forces = plant.acceleration(p, v, tau)
+
+    def center_of_mass(t):
+        p_t = p + t * v + 0.5 * t * t * a
+        w = head_pose_on_floor(robot, p_t[3:], p_t[:3])
+        return np.array(robot.link_mass_kg) @ link_centers(
+            geometry(robot, np.concatenate((w, p_t[3:])))
+        )
+
+    h = 1e-3
+    steps = [center_of_mass(k * h) for k in (-2, -1, 0, 1, 2)]
+    second = np.array([-1, 16, -30, 16, -1]) @ steps / (12 * h * h)
+    g = geometry(robot, np.concatenate((state.w, state.phi)))
+    sideways = g.to_world(g.y[g.s.wheeled]) - g.base_origin
+    np.testing.assert_allclose((forces @ sideways)[:2], second[:2], atol=1e-6 * abs(forces).max())
+
+
+@ALL
+def test_wheels_never_slip_and_the_head_moves_as_its_rate_says(robot):
+    plant, _, tau = moving(robot, 6)
+    states = [plant.step(tau, 1e-4) for _ in range(5)]
+    for state in states:
+        assert np.abs(state.slip).max() < 1e-11
+        np.testing.assert_array_equal(state.effort, tau)
+    rate = np.array([1, -8, 0, 8, -1]) @ [state.w for state in states] / 12e-4
+    np.testing.assert_allclose(rate, states[2].w_dot, atol=1e-7)
+
+
+def test_integration_is_of_fourth_order():
+    def final(dt):
+        plant, _, tau = moving(PAPER, 1)
+        plant._max_substep_s = dt
+        return plant.step(tau, 0.16).phi
+
+    exact = final(0.0005)
+    ratio = np.abs(final(0.01) - exact).max() / np.abs(final(0.005) - exact).max()
+    assert 10 < ratio < 25
+
+
+def test_falling_is_remembered():
+    plant = TorquePlant(PAPER)
+    phi = np.array(PAPER.start_joint_angles_rad)
+    assert not plant.reset(phi).fallen
+    # The neck's yaw joints swing the head aside, the others stand as stiff as this holds them.
+    wanted, state = phi.copy(), plant.reset(phi)
+    wanted[1] = 2.0
+    for _ in range(400):
+        state = plant.step(8.0 * (wanted - state.phi) - 0.2 * state.phi_dot, 2e-3)
+        if state.fallen:
+            break
+    assert state.fallen
+    assert not plant.reset(phi).fallen
+
+
+@pytest.mark.parametrize("command", [np.zeros(10), np.full(11, np.nan)])
+def test_bad_commands_are_refused(command):
+    with pytest.raises(ModelError, match="11 finite"):
+        TorquePlant(PAPER).step(command, 0.01)
+
+
+def test_a_motion_that_explodes_is_an_error():
+    with pytest.raises(ModelError, match="no longer finite"), np.errstate(all="ignore"):
+        TorquePlant(PAPER).step(np.full(11, 1e200), 1.0)
