@@ -12,12 +12,15 @@ Array = NDArray[np.float64]
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Reference:
-    """Wanted head pose and its rate.
+    """Wanted head pose, its rate and its acceleration.
 
     Attributes:
         w_d: [x_h, y_h, z_h, R, P, Y], (6,) [m, rad].
         w_d_dot: its time derivative (rates of R, P, Y, no angular velocity), (6,) [m/s, rad/s].
+        w_d_ddot: the second time derivative, which torque control feeds forward, (6,)
+            [m/s^2, rad/s^2]; default 0.
     """
 
     w_d: Array
     w_d_dot: Array
+    w_d_ddot: Array = dataclasses.field(default_factory=lambda: np.zeros(6))

@@ -28,7 +28,7 @@ def constraint_rate(g: Geometry, q_dot: Array) -> Array:
         q_dot: rate of q, (n + 5,) [m/s, rad/s]; it need not fulfil the constraints.
 
     Returns:
-        Shape of G, (n_b - m_b + 3, n + 5), rows as in ``constraint_matrix``.
+        Shape of G, (wheels + floor_rows, n + 5), rows as in ``constraint_matrix``.
     """
     s = g.s
     wheels, moved_by_head = len(s.wheeled), 6 + s.n_h
@@ -37,19 +37,20 @@ def constraint_rate(g: Geometry, q_dot: Array) -> Array:
     x_dot, y_dot, centers_dot, hitches_dot = _base_rates(g, q_dot)
     arms_dot = np.sum(x_dot * centers + x * centers_dot, axis=1)[:, None]
 
-    rate = np.zeros((wheels + 3, s.n + 5))
+    rate = np.zeros((wheels + s.floor_rows, s.n + 5))
     rate[:wheels, :moved_by_head] = (
         np.hstack((y_dot, arms_dot)) @ g.twists[[0, 1, 5]] + lateral_map(g) @ twist_rates[[0, 1, 5]]
     )
     rate[:wheels, moved_by_head:] = s.behind * (arms_dot - x_dot @ g.hitches.T - x @ hitches_dot.T)
-    rate[wheels:, :moved_by_head] = (
-        _floor_map_rate(g, q_dot) @ g.twists + floor_map(g) @ twist_rates
-    )
+    if s.floor_rows:
+        rate[wheels:, :moved_by_head] = (
+            _floor_map_rate(g, q_dot) @ g.twists + floor_map(g) @ twist_rates
+        )
     return rate
 
 
 def constraint_drift(g: Geometry, q_dot: Array, velocity: Array) -> Array:
-    """Return G_dot v without forming G_dot, (n_b - m_b + 3,) [m/s^2, rad/s^2].
+    """Return G_dot v without forming G_dot, (wheels + floor_rows,) [m/s^2, rad/s^2].
 
     Args:
         g: the posture.
@@ -74,14 +75,15 @@ def constraint_drift(g: Geometry, q_dot: Array, velocity: Array) -> Array:
     )
     sums = sums[s.wheeled]
     turning = twist[5] + sums[:, :1]
-    drift = np.empty(wheels + 3)
+    drift = np.empty(wheels + s.floor_rows)
     drift[:wheels] = y_dot @ twist[:2] + y @ twist_rate[:2]
     drift[:wheels] += np.sum(
         x_dot * (centers * turning - sums[:, 1:3])
         + x * (centers_dot * turning + centers * twist_rate[5] - sums[:, 3:]),
         axis=1,
     )
-    drift[wheels:] = _floor_map_rate(g, q_dot) @ twist + floor_map(g) @ twist_rate
+    if s.floor_rows:
+        drift[wheels:] = _floor_map_rate(g, q_dot) @ twist + floor_map(g) @ twist_rate
     return drift
 
 
@@ -125,9 +127,9 @@ def solve_B_tilde(k: Kinematics, right: Array) -> Array:
     """
     s = k.s
     head = np.linalg.solve(k.head_block, right[s.head_rows])
-    rows = slice(1, len(s.wheeled))
-    right = right[rows] - k.B_bar[rows][:, s.theta_h] @ head
-    base = solve_triangular(k.B_bar[rows][:, s.theta_b], right, lower=True, check_finite=False)
+    rows = k.B_bar[s.base_rows]
+    right = right[s.base_rows] - rows[:, s.theta_h] @ head
+    base = solve_triangular(rows[:, s.theta_b], right, lower=True, check_finite=False)
     return np.concatenate((head, base))
 
 

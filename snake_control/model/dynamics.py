@@ -31,8 +31,9 @@ Array = NDArray[np.float64]
 class FullDynamics:
     """Equation (15) without its constraint forces: M q_ddot + h + g = E tau.
 
-    In coordinates q = [w, phi]; E is zero but for a unit matrix at phi. Forces conjugate to R, P, Y
-    are what does work on their rates, no torques about axes of the world.
+    In coordinates q = [w, phi], of a planar snake, too, whose z, R and P have no part in w and
+    stay as the floor holds them; E is zero but for a unit matrix at phi. Forces conjugate to R, P
+    and Y are what does work on their rates, no torques about axes of the world.
 
     Attributes:
         M: inertia matrix, (n + 5, n + 5).
@@ -50,7 +51,7 @@ class BarDynamics:
     """Equation (16): M_bar q_ddot + h_bar = E_bar tau.
 
     Attributes:
-        M_bar: (6 + m, n + 5).
+        M_bar: (6 + m, n + 5), or (3 + m, n + 5) of a planar snake; the others likewise.
         h_bar: (6 + m,).
         E_bar: (6 + m, n - 1).
     """
@@ -65,7 +66,8 @@ class ReducedDynamics:
     """Equation (20): M_tilde w_tilde_ddot + h_tilde = E_tilde tau.
 
     Attributes:
-        M_tilde: symmetric, positive definite, (6 + m, 6 + m).
+        M_tilde: symmetric, positive definite, (6 + m, 6 + m), or (3 + m, 3 + m) of a planar snake;
+            the others likewise.
         h_tilde: (6 + m,).
         E_tilde: (6 + m, n - 1).
         F_bar_drift: F_bar_dot w_tilde_dot (19), (n - m - 1,) [rad/s^2].
@@ -93,6 +95,8 @@ class Dynamics:
         s = structure(robot)
         self._S, self._S_bar = selection(s)
         self._size = s.n + 5
+        self._planar = robot.planar
+        self._floor_height = robot.wheel_radius_m
         # Pinocchio's root joint counts x, y, z, Y, P, R. The permutation is its own inverse.
         self._order = np.array([0, 1, 2, 5, 4, 3, *range(6, self._size)])
         friction = np.zeros(self._size)
@@ -109,7 +113,7 @@ class Dynamics:
         Raises:
             ModelError: wrong shape, or not finite.
         """
-        q, q_dot = self._checked("q", q), self._checked("q_dot", q_dot)
+        q, q_dot = self._on_floor(self._checked("q", q), self._checked("q_dot", q_dot))
         order = self._order
         M = pinocchio.crba(self._model, self._data, q[order])[np.ix_(order, order)]
         g = pinocchio.computeGeneralizedGravity(self._model, self._data, q[order])[order]
@@ -147,8 +151,7 @@ class Dynamics:
             ModelError: q_dot has the wrong shape or is not finite.
             SingularError: B_tilde has no inverse.
         """
-        q_dot = self._checked("q_dot", q_dot)
-        q = posture.g.q
+        q, q_dot = self._on_floor(posture.g.q, self._checked("q_dot", q_dot))
         order = self._order
         drift = F_bar_drift(posture.g, posture.k, q_dot)
         # Rows of T [I; F_bar] (18) and T [0; F_bar_dot] w_tilde_dot (19), in Pinocchio's order.
@@ -169,6 +172,15 @@ class Dynamics:
             E_tilde=posture.k.E_tilde,
             F_bar_drift=drift,
         )
+
+    def _on_floor(self, q: Array, q_dot: Array) -> tuple[Array, Array]:
+        """Return the two with what a planar snake's q and q_dot leave open: it lies level."""
+        if not self._planar:
+            return q, q_dot
+        q, q_dot = q.copy(), q_dot.copy()
+        q[2:5] = (self._floor_height, 0.0, 0.0)
+        q_dot[2:5] = 0.0
+        return q, q_dot
 
     def _checked(self, what: str, values: ArrayLike) -> Array:
         array = np.asarray(values, dtype=float)

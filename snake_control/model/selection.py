@@ -20,6 +20,7 @@ def selection(s: Structure) -> tuple[Indices, Indices]:
     theta_bar].
 
     Returns:
-        Indices into q, counted from 0: w, H-SCPs, B-SCPs (6 + m); the other joints (n - m - 1).
+        Indices into q, counted from 0: w, H-SCPs, B-SCPs (6 + m, or 3 + m of a planar snake); the
+        other joints (n - m - 1).
     """
-    return np.concatenate((np.arange(6), 6 + s.scp)), 6 + s.theta
+    return np.concatenate((s.w, 6 + s.scp)), 6 + s.theta

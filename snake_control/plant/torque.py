@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -95,13 +96,33 @@ class TorquePlant:
             ModelError: wrong shape or not finite, or the motion is no longer finite.
         """
         tau = self._checked("joint torques", joint_command)
-        steps = max(1, math.ceil(dt / self._max_substep_s - 1e-9))
-        for _ in range(steps):
-            self._runge_kutta(tau, dt / steps)
-        if not np.isfinite(self._v).all():
-            raise ModelError("the motion is no longer finite: torques or time step too large")
-        self._v = self._allowed(self._p, self._v)
+        self._advance(lambda p, v, elapsed: tau, dt)
         return self._state(tau)
+
+    def follow(
+        self, law: Callable[[Array, Array, float], ArrayLike], dt: float
+    ) -> TorquePlantState:
+        """Advance by ``dt`` seconds with a controller that answers at every moment.
+
+        What a control law does apart from the rate at which a computer repeats it: the torques
+        change within the step, as the integration asks for them.
+
+        Args:
+            law: joint torques, (n-1,) [N m], for q, q_dot, (n + 5,) each, and the time since the
+                start of this step [s].
+            dt: time step [s].
+
+        Raises:
+            ModelError: torques of the wrong shape or not finite, or the motion is no longer finite.
+        """
+
+        def torques(p: Array, v: Array, elapsed: float) -> Array:
+            w, w_dot = self._body.head(p, v)
+            q, q_dot = np.concatenate((w, p[3:])), np.concatenate((w_dot, v[3:]))
+            return self._checked("joint torques", law(q, q_dot, elapsed))
+
+        self._advance(torques, dt)
+        return self._state(torques(self._p, self._v, dt))
 
     def acceleration(self, p: ArrayLike, v: ArrayLike, tau: ArrayLike) -> tuple[Array, Array]:
         """Return p_ddot and the wheels' side forces in any state.
@@ -130,15 +151,29 @@ class TorquePlant:
         """Rate of ``p``, (n + 2,) [m/s, rad/s]."""
         return self._v.copy()
 
-    def _runge_kutta(self, tau: Array, h: float) -> None:
+    def _advance(self, torques: Callable[[Array, Array, float], Array], dt: float) -> None:
+        steps = max(1, math.ceil(dt / self._max_substep_s - 1e-9))
+        h = dt / steps
+        for step in range(steps):
+            self._runge_kutta(torques, step * h, h)
+        if not np.isfinite(self._v).all():
+            raise ModelError("the motion is no longer finite: torques or time step too large")
+        self._v = self._allowed(self._p, self._v)
+
+    def _runge_kutta(
+        self, torques: Callable[[Array, Array, float], Array], t: float, h: float
+    ) -> None:
+        def rate(p: Array, v: Array, t: float) -> Array:
+            return self.acceleration(p, v, torques(p, v, t))[0]
+
         p, v = self._p, self._v
-        a_1, _ = self.acceleration(p, v, tau)
+        a_1 = rate(p, v, t)
         v_2 = v + 0.5 * h * a_1
-        a_2, _ = self.acceleration(p + 0.5 * h * v, v_2, tau)
+        a_2 = rate(p + 0.5 * h * v, v_2, t + 0.5 * h)
         v_3 = v + 0.5 * h * a_2
-        a_3, _ = self.acceleration(p + 0.5 * h * v_2, v_3, tau)
+        a_3 = rate(p + 0.5 * h * v_2, v_3, t + 0.5 * h)
         v_4 = v + h * a_3
-        a_4, _ = self.acceleration(p + h * v_3, v_4, tau)
+        a_4 = rate(p + h * v_3, v_4, t + h)
         self._p = p + h / 6 * (v + 2 * v_2 + 2 * v_3 + v_4)
         self._v = v + h / 6 * (a_1 + 2 * a_2 + 2 * a_3 + a_4)
 

@@ -186,6 +186,16 @@ CASES = {
     "case 4": ("controller", {"case": 4}, "case", "1, 2, 3"),
     "K too short": ("controller", {"K": [0.4, 0.25, 0.5]}, "K", "6"),
     "gain on an SCP": ("controller", {"K": [0.4] * 6 + [0.1, 0.0, 0.0, 0.0]}, "K", "SCP"),
+    "K_v of w alone": ("controller", {"K_v": [4.0] * 6}, "K_v", "6 + m = 10"),
+    "K_p on an SCP": ("controller", {"K_p": [4.0] * 10}, "K_p", "SCP"),
+    "one size of links": ("robot", {"link_size_m": [0.05]}, "link_size_m", "width and height"),
+    "negative friction": ("robot", {"joint_friction": [-0.1]}, "joint_friction", "0 to 1000"),
+    "torque limits for some": (
+        "robot",
+        {"joint_torque_limits_n_m": [1.5, 1.5]},
+        "joint_torque_limits_n_m",
+        "one for each joint",
+    ),
     "negative gain": ("controller", {"a_h": -1.0}, "a_h", "0"),
 }
 

@@ -53,6 +53,7 @@ def test_gravity_is_the_gradient_of_the_potential_energy(robot):
 def test_coriolis_term_is_lagranges(robot):
     q = random_q(robot, 3)
     q_dot = np.random.default_rng(3).uniform(-1, 1, len(q))
+    q_dot[2:5] *= not robot.planar
     h = Dynamics(robot).full(q, q_dot).h
     np.testing.assert_allclose(h, coriolis(robot, q, q_dot), atol=1e-8 * np.abs(h).max())
 
@@ -74,8 +75,9 @@ def test_friction_is_viscous_and_the_joints_own():
 def test_selections_make_a_permutation(robot):
     S, S_bar = selection(Posture(robot, random_q(robot, 1)).g.s)
     T = np.concatenate((S, S_bar))
-    np.testing.assert_array_equal(np.sort(T), np.arange(robot.links + 5))
-    np.testing.assert_array_equal(S[6:], 5 + np.array(robot.scp_joints))
+    expected = [*robot.controlled, *range(6, robot.links + 5)]
+    np.testing.assert_array_equal(np.sort(T), expected)
+    np.testing.assert_array_equal(S[len(robot.controlled) :], 5 + np.array(robot.scp_joints))
 
 
 @ALL
@@ -84,15 +86,21 @@ def test_accelerations_are_those_with_the_constraint_forces(robot):
     posture, q_dot = consistent(robot, 6)
     dynamics = Dynamics(robot)
     full, reduced = dynamics.full(posture.g.q, q_dot), dynamics.reduced(posture, q_dot)
+    S, S_bar = selection(posture.g.s)
     tau = np.random.default_rng(6).uniform(-0.5, 0.5, robot.joints)
     G = posture.k.G
     rows, size = G.shape
     system = np.block([[full.M, G.T], [G, np.zeros((rows, rows))]])
     force = np.concatenate((np.zeros(6), tau)) - full.h - full.g
     right = np.concatenate((force, -constraint_rate(posture.g, q_dot) @ q_dot))
-    expected = np.linalg.solve(system, right)[:size]
+    if robot.planar:
+        # The floor holds z, R and P with forces of its own.
+        keep = np.concatenate((S, S_bar, range(size, size + rows)))
+        system, right = system[np.ix_(keep, keep)], right[keep]
+    solution = np.linalg.solve(system, right)[: len(S) + len(S_bar)]
+    expected = np.zeros(size)
+    expected[np.concatenate((S, S_bar)) if robot.planar else np.arange(size)] = solution
 
-    S, S_bar = selection(posture.g.s)
     w_tilde_ddot = np.linalg.solve(reduced.M_tilde, reduced.E_tilde @ tau - reduced.h_tilde)
     theta_bar_ddot = posture.k.F_bar @ w_tilde_ddot + reduced.F_bar_drift
     scale = np.abs(expected).max()
@@ -132,6 +140,22 @@ def test_bar_and_tilde_agree(robot):
     np.testing.assert_array_equal(bar.E_bar, reduced.E_tilde)
     np.testing.assert_allclose(reduced.M_tilde, reduced.M_tilde.T, atol=1e-12)
     assert np.linalg.eigvalsh(reduced.M_tilde)[0] > 0
+
+
+def test_planar_snakes_ignore_what_they_have_no_coordinate_for():
+    robot = ROBOTS["planar"]
+    posture, q_dot = consistent(robot, 9)
+    off = posture.g.q.copy()
+    off[2:5] = 0.3
+    odd = q_dot.copy()
+    odd[2:5] = 1.0
+    found = Dynamics(robot).reduced(Posture(robot, off), odd)
+    expected = Dynamics(robot).reduced(posture, q_dot)
+    np.testing.assert_array_equal(found.M_tilde, expected.M_tilde)
+    np.testing.assert_array_equal(found.h_tilde, expected.h_tilde)
+    # Nothing to lift: no gravity in the plane.
+    still = Dynamics(robot).reduced(posture, np.zeros_like(q_dot))
+    np.testing.assert_allclose(still.h_tilde, 0.0, atol=1e-12)
 
 
 @pytest.mark.parametrize("q_dot", [np.zeros(16), np.full(17, np.nan)])
