@@ -7,6 +7,8 @@ V the motion of all coordinates between it and the base.
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
@@ -18,6 +20,8 @@ from snake_control.model.rotation import cross
 from snake_control.model.selection import selection
 
 Array = NDArray[np.float64]
+
+_TO_COMPLEX = np.array([1.0, 1.0j])
 
 
 def constraint_rate(g: Geometry, q_dot: Array) -> Array:
@@ -58,32 +62,26 @@ def constraint_drift(g: Geometry, q_dot: Array, velocity: Array) -> Array:
         velocity: v, (n + 5,); q_dot itself for the acceleration that the constraints impose.
     """
     s = g.s
-    wheels, moved_by_head = len(s.wheeled), 6 + s.n_h
-    twist = g.twists @ velocity[:moved_by_head]
-    twist_rate = _twist_rates(g, q_dot) @ velocity[:moved_by_head]
-    x, y, centers = g.x[s.wheeled], g.y[s.wheeled], g.centers[s.wheeled]
-    x_dot, y_dot, centers_dot, hitches_dot = _base_rates(g, q_dot)
-
-    # Base joints ahead of a link add turning V and, about their hitches, moment H to the base's
-    # own motion: its lateral velocity is y.v + x.(c (omega + V) - H).
-    by_joints = velocity[moved_by_head:, None]
-    sums = np.zeros((s.n_b, 5))
-    np.cumsum(
-        np.hstack((by_joints, by_joints * g.hitches, by_joints * hitches_dot)),
-        axis=0,
-        out=sums[1:],
-    )
-    sums = sums[s.wheeled]
-    turning = twist[5] + sums[:, :1]
-    drift = np.empty(wheels + s.floor_rows)
-    drift[:wheels] = y_dot @ twist[:2] + y @ twist_rate[:2]
-    drift[:wheels] += np.sum(
-        x_dot * (centers * turning - sums[:, 1:3])
-        + x * (centers_dot * turning + centers * twist_rate[5] - sums[:, 3:]),
-        axis=1,
-    )
+    head = 6 + s.n_h
+    twist, twist_rate, angular = _base_motion(g, q_dot[:head], velocity[:head])
+    turn, turn_rate = twist[5], twist_rate[5]
+    # In the base plane as x + i y. A link's centre moves by what its base frame does and by the
+    # turning of the links in front of it, along q_dot and along v.
+    forward, centers = g.x @ _TO_COMPLEX, g.centers @ _TO_COMPLEX
+    along = np.zeros((2, s.n_b))
+    np.cumsum(q_dot[head:], out=along[0, 1:])
+    np.cumsum(velocity[head:], out=along[1, 1:])
+    terms = np.empty((3, s.n_b), dtype=complex)
+    terms[:2] = along * forward
+    terms[2] = along[1] * terms[0]
+    centers_dot, moved, turned = _chain(terms, s.robot.half_length_m)
+    u = complex(twist[0], twist[1]) + 1j * (turn * centers + moved)
+    u_dot = complex(twist_rate[0], twist_rate[1]) + 1j * turn_rate * centers
+    u_dot -= turn * centers_dot + turned
+    drift = np.empty(len(s.wheeled) + s.floor_rows)
+    drift[: len(s.wheeled)] = (forward.conj() * (u_dot - 1j * along[0] * u)).imag[s.wheeled]
     if s.floor_rows:
-        drift[wheels:] = _floor_map_rate(g, q_dot) @ twist + floor_map(g) @ twist_rate
+        drift[len(s.wheeled) :] = _floor_drift(g, twist, twist_rate, angular)
     return drift
 
 
@@ -180,3 +178,75 @@ def _floor_map_rate(g: Geometry, q_dot: Array) -> Array:
     rate[0, 5] = -half * turned[2, 1]
     rate[1:, 3:] = turned[:2]
     return rate
+
+
+def _chain(terms: NDArray[np.complex128], half: float) -> NDArray[np.complex128]:
+    """Return the centres of links whose directions are ``terms``, one chain in each row."""
+    centers: NDArray[np.complex128] = half * terms - 2 * half * np.cumsum(terms, axis=1)
+    return centers
+
+
+def _base_motion(
+    g: Geometry, q_dot: Array, velocity: Array
+) -> tuple[list[float], list[float], list[float]]:
+    """Return twists @ v, its rate along q_dot at constant v, and the base's angular velocity.
+
+    Args:
+        g: the posture.
+        q_dot: rate of [w, head joints], (6 + n_h,).
+        velocity: v of the same, (6 + n_h,).
+
+    Returns:
+        Six numbers, six numbers, and three along q_dot, all in base coordinates.
+    """
+    moving = g.twists * q_dot
+    parts = g.twists * velocity
+    # Sum of v_j V_j x (what lies between j and the base): the antisymmetric parts of one product.
+    products = (parts @ (moving @ _behind(g.s.n_h)).T).tolist()
+    linear = [
+        a + b for a, b in zip(_cross_sum(products, 0, 3), _cross_sum(products, 3, 0), strict=True)
+    ]
+    twist_rate = [*linear, *_cross_sum(products, 3, 3)]
+    return parts.sum(axis=1).tolist(), twist_rate, moving[3:].sum(axis=1).tolist()
+
+
+def _cross_sum(products: list[list[float]], first: int, second: int) -> tuple[float, float, float]:
+    """Return the sum of cross products whose outer products are a block of ``products``."""
+    i, j = first, second
+    return (
+        products[i + 1][j + 2] - products[i + 2][j + 1],
+        products[i + 2][j] - products[i][j + 2],
+        products[i][j + 1] - products[i + 1][j],
+    )
+
+
+@functools.lru_cache(maxsize=64)
+def _behind(n_h: int) -> Array:
+    """Return 1.0 where the coordinate of the row lies between that of the column and the base."""
+    order = np.array([0, 1, 2, 5, 4, 3, *range(6, 6 + n_h)])
+    place = np.argsort(order)
+    return (place[:, None] > place[None, :]).astype(float)
+
+
+def _floor_drift(
+    g: Geometry, twist: list[float], twist_rate: list[float], angular: list[float]
+) -> Array:
+    """Return the floor rows' part of the drift, (3,): v_z, omega_x, omega_y."""
+    half = g.s.robot.half_length_m
+    v_x, v_y, v_z, w_x, w_y, w_z = twist
+    a_x, a_y, a_z, b_x, b_y, b_z = twist_rate
+    # The first base link's centre lies at (-l, 0, 0).
+    v_y, v_z, a_y, a_z = v_y - half * w_z, v_z + half * w_y, a_y - half * b_z, a_z + half * b_y
+    p, q, r = angular
+    # What turns with the base changes by its own rate and by the turning.
+    up = g.base_rotation[2] @ (
+        a_x + q * v_z - r * v_y,
+        a_y + r * v_x - p * v_z,
+        a_z + p * v_y - q * v_x,
+    )
+    sides = g.base_rotation[:2] @ (
+        b_x + q * w_z - r * w_y,
+        b_y + r * w_x - p * w_z,
+        b_z + p * w_y - q * w_x,
+    )
+    return np.array([up, *sides])
