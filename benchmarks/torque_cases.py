@@ -67,7 +67,7 @@ def simulate(run: Run, duration_s: float) -> list[tuple[float, TorquePlantState,
     if run.approach_s:
         goal = Approach(LINE, state.w, 0.0, run.approach_s).sample
     samples = []
-    for step in tqdm(range(round(duration_s / SAMPLE_S) + 1), desc=run.title):
+    for step in tqdm(range(round(duration_s / SAMPLE_S) + 1), desc=run.title, disable=None):
         t = step * SAMPLE_S
         result = controller.step(*_measured(state), goal(t), t)
         samples.append((t, state, result))

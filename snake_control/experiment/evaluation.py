@@ -14,6 +14,7 @@ from snake_control.config import Config, RobotConfig
 from snake_control.control.scp_controller import ControlResult, ScpController
 from snake_control.errors import ConfigError, SingularError
 from snake_control.experiment.cases import CASES
+from snake_control.model.dynamics import Dynamics
 from snake_control.model.posture import Posture
 from snake_control.trajectory.configured import configured_trajectory
 
@@ -60,6 +61,7 @@ def evaluate(config: Config, state: State) -> dict[str, Any]:
     """
     posture = Posture(config.robot, state.q)
     k = posture.k
+    dynamics = Dynamics(config.robot)
     quantities: dict[str, Callable[[], object]] = {
         "A_bar": lambda: k.A_bar,
         "B_bar": lambda: k.B_bar,
@@ -70,6 +72,8 @@ def evaluate(config: Config, state: State) -> dict[str, Any]:
         "V_h": lambda: posture.V_h,
         "V_b1": lambda: posture.V_b1,
         "d_min": lambda: posture.support.d_min,
+        "M_tilde": lambda: dynamics.reduced(posture, state.q_dot).M_tilde,
+        "h_tilde": lambda: dynamics.reduced(posture, state.q_dot).h_tilde,
     }
     found = {name: _number(value) for name, value in quantities.items()}
     return found | _control(config, state)

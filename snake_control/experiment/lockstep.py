@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Iterator
-from typing import Protocol
+from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,17 +17,26 @@ from snake_control.plant.plant import Plant, PlantState
 Array = NDArray[np.float64]
 
 
-class Controller(Protocol):
+class Decision(Protocol):
+    """What a controller decided: at least the command ``u`` for the joints."""
+
+    @property
+    def u(self) -> Array:
+        """Joint velocities or torques, as the plant takes them, (n-1,)."""
+
+
+Result_co = TypeVar("Result_co", bound=Decision, covariant=True)
+
+
+class Controller(Protocol[Result_co]):
     """What decides, once each control cycle; ``ScpController`` and others of its kind."""
 
-    def step(
-        self, q: ArrayLike, q_dot: ArrayLike | None, reference: Reference, t: float
-    ) -> ControlResult:
+    def step(self, q: ArrayLike, q_dot: ArrayLike, reference: Reference, t: float) -> Result_co:
         """Return the command for a posture, and everything that led to it."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class LockstepSample:
+class LockstepSample(Generic[Result_co]):
     """One cycle: what was there, was measured and decided at time t, before the joints moved.
 
     Attributes:
@@ -38,7 +47,7 @@ class LockstepSample:
 
     t: float
     state: PlantState
-    result: ControlResult
+    result: Result_co
 
 
 class Unlimited:
@@ -47,13 +56,11 @@ class Unlimited:
     The paper's law knows neither; together with perfect servos this is the paper's own model.
     """
 
-    def __init__(self, controller: Controller) -> None:
+    def __init__(self, controller: Controller[ControlResult]) -> None:
         """Take the limits off ``controller``."""
         self._controller = controller
 
-    def step(
-        self, q: ArrayLike, q_dot: ArrayLike | None, reference: Reference, t: float
-    ) -> ControlResult:
+    def step(self, q: ArrayLike, q_dot: ArrayLike, reference: Reference, t: float) -> ControlResult:
         """Return what the controller decides, as if no limit had bitten."""
         result = self._controller.step(q, q_dot, reference, t)
         return dataclasses.replace(
@@ -68,23 +75,24 @@ class Unlimited:
 def lockstep(
     plant: Plant,
     state: PlantState,
-    controller: Controller,
+    controller: Controller[Result_co],
     reference: Callable[[float], Reference],
     duration_s: float,
     dt: float,
     servos: Servos | None = None,
     plant_steps: int = 1,
-) -> Iterator[LockstepSample]:
+) -> Iterator[LockstepSample[Result_co]]:
     """Run a controller against a plant.
 
     Args:
         plant: the body, already reset.
         state: its state at t = 0, as ``reset`` returned it.
-        controller: the controller.
+        controller: the controller; its commands are what the plant takes.
         reference: wanted head pose at a time.
         duration_s: length of the run [s].
         dt: control cycle [s].
-        servos: what stands between controller and joints; perfect ones by default.
+        servos: what stands between controller and joints; perfect ones, which pass velocities or
+            torques on as they are, by default.
         plant_steps: steps of the plant in each control cycle.
 
     Yields:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from snake_control.config import Config
-from snake_control.control.scp_controller import ScpController
+from snake_control.control.scp_controller import ControlResult, ScpController
 from snake_control.errors import SingularError
 from snake_control.experiment.lockstep import Controller, LockstepSample, Unlimited, lockstep
 from snake_control.experiment.parameters import configuration_parameters
@@ -126,7 +126,7 @@ def run_case(
     return CaseRun(case, config, settings, series, summarise(series, run), interrupted)
 
 
-def step_of(sample: LockstepSample) -> Step:
+def step_of(sample: LockstepSample[ControlResult]) -> Step:
     """Return the row of a sample; nobody timed it, and there is no bus."""
     state, result = sample.state, sample.result
     limited = result.speed_scale < 1.0 or bool(result.range_limited)
@@ -155,11 +155,11 @@ def step_of(sample: LockstepSample) -> Step:
     )
 
 
-def _samples(config: Config, settings: Settings) -> Iterator[LockstepSample]:
+def _samples(config: Config, settings: Settings) -> Iterator[LockstepSample[ControlResult]]:
     robot = config.robot
     plant = KinematicPlant(robot)
     state = plant.reset(robot.start_joint_angles_rad)
-    controller: Controller = ScpController(robot, config.controller)
+    controller: Controller[ControlResult] = ScpController(robot, config.controller)
     servos: Servos = LimitedServos(robot, settings.carry_remainder)
     if settings.servos == "perfect":
         controller, servos = Unlimited(controller), PerfectServos()

@@ -64,6 +64,8 @@ def test_keys_and_shapes_follow_the_robot(name):
         "V_h": (),
         "V_b1": (),
         "d_min": (),
+        "M_tilde": (w + s.m, w + s.m),
+        "h_tilde": (w + s.m,),
         "phi_dot_hd": (s.m_h,),
         "phi_dot_bd": (s.m_b,),
         "u": (joints,),
