@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from snake_control.config import RobotConfig
 from snake_control.model.floor import GRAVITY_M_S2
-from snake_control.model.rotation import rpy_from_rotation, rpy_rates
+from snake_control.model.rotation import rpy_from_rotation, rpy_rate_drift, rpy_rates
 from snake_control.model.urdf import link_box_m
 
 Array = NDArray[np.float64]
@@ -106,6 +106,24 @@ class FloorBody:
             np.concatenate((pose.translation, rpy)),
             np.concatenate((motion.linear, rpy_rates(rpy, motion.angular))),
         )
+
+    def head_acceleration(self, p: Array, v: Array, a: Array) -> Array:
+        """Return w_ddot for p_ddot = a, (6,) [m/s^2, rad/s^2].
+
+        Args:
+            p: [x, y, yaw, phi], (n + 2,) [m, rad].
+            v: its rate, (n + 2,).
+            a: the rate of v, (n + 2,).
+        """
+        model, data, order = self._model, self._data, self._order
+        pinocchio.forwardKinematics(model, data, p[order], v[order], a[order])
+        world = pinocchio.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        pose = pinocchio.updateFramePlacement(model, data, self._tip)
+        angular = pinocchio.getFrameVelocity(model, data, self._tip, world).angular
+        motion = pinocchio.getFrameClassicalAcceleration(model, data, self._tip, world)
+        rpy = rpy_from_rotation(pose.rotation)
+        by_rates = rpy_rate_drift(rpy, rpy_rates(rpy, angular))
+        return np.concatenate((motion.linear, rpy_rates(rpy, motion.angular - by_rates)))
 
     def _grow(self, robot: RobotConfig) -> list[int]:
         """Make the tree; return Pinocchio's number of each joint, joint 1 first."""

@@ -129,3 +129,25 @@ def rpy_rates(rpy: ArrayLike, angular: ArrayLike) -> Array:
             z + math.sin(pitch) * roll_rate,
         ]
     )
+
+
+def rpy_rate_drift(rpy: ArrayLike, rates: ArrayLike) -> Array:
+    """Return the angular acceleration in the world at even rates of [R, P, Y], (3,) [rad/s^2].
+
+    The time derivative of ``rpy_rate_map`` times the rates.
+
+    Args:
+        rpy: roll, pitch, yaw [rad], (3,).
+        rates: their rates [rad/s], (3,).
+    """
+    _, pitch, yaw = (float(angle) for angle in np.asarray(rpy, dtype=float))
+    r, p, y = (float(rate) for rate in np.asarray(rates, dtype=float))
+    cp, sp = math.cos(pitch), math.sin(pitch)
+    cy, sy = math.cos(yaw), math.sin(yaw)
+    return np.array(
+        [
+            -r * (y * sy * cp + p * cy * sp) - p * y * cy,
+            r * (y * cy * cp - p * sy * sp) - p * y * sy,
+            -r * p * cp,
+        ]
+    )

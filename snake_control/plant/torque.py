@@ -30,11 +30,15 @@ class TorquePlantState(PlantState):
     ``effort`` is the applied torque.
 
     Attributes:
+        w_ddot: acceleration of the head pose, (6,) [m/s^2, rad/s^2].
+        phi_ddot: joint accelerations, (n-1,) [rad/s^2].
         wheel_forces: force of the floor on each wheeled base link along its own y axis (left),
             ascending, (n_b - m_b,) [N].
         energy: kinetic and potential energy together [J].
     """
 
+    w_ddot: Array
+    phi_ddot: Array
     wheel_forces: Array
     energy: float
 
@@ -186,7 +190,7 @@ class TorquePlant:
     def _state(self, tau: Array) -> TorquePlantState:
         p, v = self._p, self._v
         w, w_dot = self._body.head(p, v)
-        _, forces = self.acceleration(p, v, tau)
+        a, forces = self.acceleration(p, v, tau)
         d_min = support(geometry(self._robot, np.concatenate((w, p[3:])))).d_min
         self._fallen |= d_min < 0
         return TorquePlantState(
@@ -198,6 +202,8 @@ class TorquePlant:
             slip=self._body.dynamics(p, v).wheel_rows @ v,
             d_min=d_min,
             fallen=self._fallen,
+            w_ddot=self._body.head_acceleration(p, v, a),
+            phi_ddot=a[3:].copy(),
             wheel_forces=forces,
             energy=self._body.energy(p, v),
         )

@@ -11,6 +11,7 @@ from snake_control.model.rotation import (
     rotation_from_rpy,
     rpy_from_quaternion,
     rpy_from_rotation,
+    rpy_rate_drift,
     rpy_rate_map,
     rpy_rates,
     unwrap_near,
@@ -37,6 +38,9 @@ def test_rate_map_is_the_derivative(roll, tilt, yaw, rate):
     turn = rotation_from_rpy(rpy + h * rate) @ rotation_from_rpy(rpy - h * rate).T
     omega = Rotation.from_matrix(turn).as_rotvec() / (2 * h)
     np.testing.assert_allclose(rpy_rate_map(rpy) @ rate, omega, atol=1e-7)
+    turned = [rpy_rate_map(rpy + side * h * rate) @ rate for side in (1, -1)]
+    drift = (turned[0] - turned[1]) / (2 * h)
+    np.testing.assert_allclose(rpy_rate_drift(rpy, rate), drift, atol=1e-7)
     np.testing.assert_allclose(rpy_rates(rpy, rpy_rate_map(rpy) @ rate), rate, atol=1e-11)
 
 
