@@ -33,6 +33,8 @@ class Facts:
         self.run = run
         self.t: Array = run.series.numbers("t_s")
         self.error: Array = run.series.error
+        # z, R, P of a planar snake are nobody's to follow.
+        self.error[:, [i for i in range(6) if i not in run.config.robot.controlled]] = 0.0
         self.phi: Array = run.series.phi
         self.V_b1: Array = run.series.numbers("V_b1")
         self.V_h: Array = run.series.numbers("V_h")

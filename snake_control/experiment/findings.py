@@ -325,14 +325,14 @@ def _case_3_fastest(one: Facts, two: Facts, three: Facts) -> _Judged:
 @_statement((2, 3), "The motion of Case 3 differs from that of Case 2 (Section 5).", window=True)
 def _other_motion(two: Facts, three: Facts) -> _Judged:
     sizes = _base_sizes(two), _base_sizes(three)
-    changes = [abs(sizes[1][joint] / sizes[0][joint] - 1.0) for joint in sizes[0]]
+    change = max(abs(sizes[1][j] - sizes[0][j]) / max(sizes[0][j], 1e-9) for j in sizes[0])
     names = ", ".join(f"phi_{joint}" for joint in sizes[0])
     found = (
         f"Peak to peak of {names}: {_list(sizes[0].values())} rad in Case 2, "
         f"{_list(sizes[1].values())} rad in Case 3."
     )
-    numbers = {"largest_relative_change": max(changes)}
-    return max(changes) > _OTHER_SHAPE, found, numbers, ""
+    numbers = {"largest_relative_change": change}
+    return change > _OTHER_SHAPE, found, numbers, ""
 
 
 @_statement((2, 3), "The motion of the B-SCPs does not affect the head part (Sections 2, 6).")

@@ -1,0 +1,103 @@
+"""Cases in lockstep: the same every time, recorded like the demo's, whatever ends them."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from snake_control.experiment.cases import case_files, load_case
+from snake_control.experiment.run import AFTER_FALL_S, Settings, run_case
+from snake_control.experiment.series import Series
+from support.robots import CONFIG
+from support.runs import paper_run
+
+SHORT = Settings(duration_s=0.4, plant_step_s=0.02)
+
+
+@pytest.mark.parametrize("servos", ["perfect", "limited"])
+def test_the_same_run_writes_the_same_bytes(servos, tmp_path):
+    settings = dataclasses.replace(SHORT, servos=servos)
+    files = [tmp_path / "a.csv", tmp_path / "b.csv"]
+    runs = [run_case(load_case((), 3), settings, path) for path in files]
+    assert files[0].read_bytes() == files[1].read_bytes()
+    assert runs[0].summary == runs[1].summary
+    assert len(Series.read(files[0], runs[0].config.robot)) == 21
+
+
+def test_summary_says_how_the_run_was_made():
+    run = run_case(load_case((), 2), dataclasses.replace(SHORT, servos="limited"))
+    parameters = run.summary["parameters"]
+    assert (run.case, run.summary["case"], run.summary["ended"]) == (2, 2, "duration reached")
+    assert parameters["servos"] == "limited"
+    assert parameters["carry_remainder"] is True
+    assert parameters["control_rate_hz"] == 50.0
+    assert parameters["a_prime"] == 1e-11
+    assert run.summary["control"]["period_p50_s"] == pytest.approx(0.02)
+    assert run.summary["tracking_error_source"] == "ground truth"
+
+
+def test_rate_and_plant_step():
+    assert Settings().plant_steps == 4
+    assert Settings(rate_hz=200.0, plant_step_s=0.005).plant_steps == 1
+    assert Settings(rate_hz=100.0, plant_step_s=0.003).plant_steps == 4
+    run = run_case(load_case((), 2), dataclasses.replace(SHORT, rate_hz=100.0))
+    assert len(run.series) == 41
+
+
+def test_plant_step_hardly_matters_beside_the_control_cycle():
+    fine = run_case(load_case((), 3), Settings(duration_s=3.0, plant_step_s=0.005))
+    coarse = run_case(load_case((), 3), Settings(duration_s=3.0, plant_step_s=0.02))
+    np.testing.assert_allclose(fine.series.phi[-1], coarse.series.phi[-1], atol=2e-3)
+
+
+def test_a_wish_to_stop_ends_the_run_with_what_there_is():
+    run = run_case(load_case((), 3), SHORT, on_step=lambda step: step.t_s < 0.1)
+    assert run.interrupted
+    assert run.summary["ended"] == "interrupted at 0.10 s"
+    assert len(run.series) == 6
+
+
+def test_a_fall_ends_the_run_a_little_later():
+    config = load_case((), 3)
+    # The head leans so far to the side that P_G leaves the wheels.
+    robot = dataclasses.replace(
+        config.robot, start_joint_angles_rad=(0.0, 1.4, 0.0, 1.4, 0.9, *(0.1,) * 6)
+    )
+    run = run_case(dataclasses.replace(config, robot=robot), Settings(plant_step_s=0.02))
+    assert run.summary["fell_at_s"] == 0.0
+    assert run.summary["ended"] == "the robot fell at 0.0 s"
+    assert run.summary["duration_s"] == pytest.approx(AFTER_FALL_S)
+
+
+def test_a_singular_posture_ends_the_run_in_words():
+    config = load_case((), 3)
+    robot = dataclasses.replace(config.robot, start_joint_angles_rad=(0.0,))
+    run = run_case(dataclasses.replace(config, robot=robot), SHORT)
+    assert run.summary["ended"].startswith("no answer after 0.00 s: B_tilde")
+    assert len(run.series) == 0
+
+
+def test_perfect_servos_know_no_limits_and_limited_ones_do():
+    assert np.abs(paper_run(1).series.phi).max() > 6.5
+    assert np.abs(paper_run(1, "limited").series.phi).max() <= 2.6
+    assert paper_run(1).summary["limits"]["speed_limit_steps"] == 0
+    assert paper_run(1, "limited").summary["limits"]["speed_limit_steps"] > 0
+
+
+def test_planar_snake_runs():
+    run = run_case(load_case([CONFIG / "planar_snake.yaml"], None), SHORT)
+    assert run.summary["ended"] == "duration reached"
+    assert run.case == 2
+
+
+def test_case_wins_over_the_files_and_explicit_weights_over_the_case(tmp_path):
+    mine = tmp_path / "mine.yaml"
+    mine.write_text(
+        "/**:\n  ros__parameters:\n    controller:\n      case: 1\n      b_prime: 7.0\n"
+    )
+    config = load_case([case_files(3)[0], mine], 2)
+    assert (config.controller.case, config.controller.b_prime) == (2, 7.0)
+    assert load_case([mine], None).controller.case == 1
+    assert load_case((), None).controller.case == 3
