@@ -160,7 +160,7 @@ class FloorBody:
             self._wheels.append(self._add_frame(f"wheels_{link}", joint, _shift(x=center)))
 
     def _add_frame(self, name: str, joint: int, placement: pinocchio.SE3) -> int:
-        frame = pinocchio.Frame(name, joint, placement, pinocchio.FrameType.OP_FRAME)
+        frame = pinocchio.Frame(name, joint, 0, placement, pinocchio.FrameType.OP_FRAME)
         return int(self._model.addFrame(frame))
 
 
