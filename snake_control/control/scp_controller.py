@@ -15,6 +15,7 @@ from snake_control.errors import SingularError
 from snake_control.model.posture import Posture
 from snake_control.model.redundancy import joint_velocities
 from snake_control.model.rotation import wrap
+from snake_control.model.singular_shape import SingularShape
 from snake_control.model.structure import structure
 
 Array = NDArray[np.float64]
@@ -35,6 +36,7 @@ class ControlResult:
         speed_limited, range_limited: joints whose limits bit, counted from 1.
         V_h, V_b1, d_min: cost functions (29), (30).
         sigma_min_B_tilde, sigma_min_A_hat: smallest singular values of (7), (11).
+        singular_shape: the singular shape of Fig. 5 that is next, and how near it is.
         support_polygon: corners, counter-clockwise, (k, 2) [m].
         center_of_mass: P_G, (2,) [m].
     """
@@ -55,6 +57,7 @@ class ControlResult:
     d_min: float
     sigma_min_B_tilde: float
     sigma_min_A_hat: float
+    singular_shape: SingularShape
     support_polygon: Array
     center_of_mass: Array
 
@@ -131,6 +134,7 @@ class ScpController:
             d_min=posture.support.d_min,
             sigma_min_B_tilde=k.sigma_min_B_tilde,
             sigma_min_A_hat=k.sigma_min_A_hat,
+            singular_shape=posture.singular_shape,
             support_polygon=posture.support.polygon,
             center_of_mass=posture.support.center_of_mass,
         )

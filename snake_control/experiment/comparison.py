@@ -51,9 +51,10 @@ def scps(runs: Mapping[int, Series]) -> Figure:
 
 
 def base_costs(runs: Mapping[int, Series]) -> Figure:
-    """V_b1 and d_min (Fig. 14)."""
+    """V_b1 and d_min (Fig. 14), and the nearness of a singular shape (Fig. 5)."""
     rows: list[_Row] = [
         ("$V_{b1}$", panels.V_b1_line),
+        ("singular shape", panels.nearness_line),
         ("$d_{min}$ [mm]", panels.d_min_lines),
     ]
     return _side_by_side(runs, rows, 2.3)

@@ -72,6 +72,7 @@ def evaluate(config: Config, state: State) -> dict[str, Any]:
         "V_h": lambda: posture.V_h,
         "V_b1": lambda: posture.V_b1,
         "d_min": lambda: posture.support.d_min,
+        "singular_nearness": lambda: posture.singular_shape.nearness,
         "M_tilde": lambda: dynamics.reduced(posture, state.q_dot).M_tilde,
         "h_tilde": lambda: dynamics.reduced(posture, state.q_dot).h_tilde,
     }

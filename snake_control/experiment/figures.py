@@ -104,13 +104,16 @@ def scps(series: Series) -> Figure:
 
 
 def base_costs(series: Series) -> Figure:
-    """V_b1 on a logarithmic axis and d_min (30) (Fig. 14)."""
-    figure = Figure(figsize=(9.0, 5.2))
+    """V_b1 on a logarithmic axis, d_min (30) (Fig. 14), and the nearness of a singular shape."""
+    figure = Figure(figsize=(9.0, 7.0))
     figure.suptitle("Distance from singularity and from falling")
-    upper, lower = figure.subplots(2, 1, sharex=True)
+    upper, middle, lower = figure.subplots(3, 1, sharex=True)
     panels.V_b1_line(upper, series)
     panels.time_axis(upper, series, last=False)
     upper.set_ylabel("$V_{b1}$")
+    panels.nearness_line(middle, series)
+    panels.time_axis(middle, series, last=False)
+    middle.set_ylabel("nearness of a\nsingular shape")
     panels.d_min_lines(lower, series)
     panels.time_axis(lower, series, last=True)
     lower.set_ylabel("$d_{min}$ [mm]")

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from snake_control.config import RobotConfig
 from snake_control.experiment import style
 from snake_control.experiment.series import Series
+from snake_control.model.singular_shape import SINGULAR_ABOVE
 
 Array = NDArray[np.float64]
 
@@ -65,6 +66,13 @@ def V_b1_line(axes: Axes, series: Series) -> None:
     axes.plot(series.numbers("t_s"), np.where(V_b1 > 0, V_b1, np.nan), color=style.BLUE)
     if (V_b1 > 0).any():
         axes.set_yscale("log")
+
+
+def nearness_line(axes: Axes, series: Series) -> None:
+    """Draw how near a singular shape of Fig. 5 is, 0..1, and from where on it counts as one."""
+    axes.plot(series.numbers("t_s"), series.numbers("singular_nearness"), color=style.BLUE)
+    axes.axhline(SINGULAR_ABOVE, color=style.FALL, linewidth=0.9)
+    axes.set_ylim(0.0, 1.02)
 
 
 def d_min_lines(axes: Axes, series: Series) -> None:

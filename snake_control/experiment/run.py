@@ -147,6 +147,8 @@ def step_of(sample: LockstepSample[ControlResult]) -> Step:
         d_min=result.d_min,
         sigma_min_B_tilde=result.sigma_min_B_tilde,
         sigma_min_A_hat=result.sigma_min_A_hat,
+        singular_nearness=result.singular_shape.nearness,
+        singular_shape=result.singular_shape.kind,
         w=state.w,
         phi=state.phi,
         d_min_true=state.d_min,

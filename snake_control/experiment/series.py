@@ -46,6 +46,8 @@ class Step:
         d_min: distance to the edge of the support polygon as the controller sees it [m].
         d_min_true: the same of the ground truth [m].
         sigma_min_B_tilde, sigma_min_A_hat: smallest singular values of (7), (11).
+        singular_nearness: how near a singular shape of Fig. 5 is, 0..1.
+        singular_shape: which: ``parallel`` or ``arc``, empty while unknown.
         fallen: whether the robot has fallen by now, in truth.
         slip: sideways velocity of each wheeled link, in truth [m/s].
         step_time_s: computation time of the control step [s].
@@ -68,6 +70,8 @@ class Step:
     d_min: float
     sigma_min_B_tilde: float
     sigma_min_A_hat: float
+    singular_nearness: float
+    singular_shape: str
     w: ArrayLike | None = None
     phi: ArrayLike | None = None
     d_min_true: float = np.nan
@@ -132,6 +136,8 @@ def columns(robot: RobotConfig) -> tuple[Column, ...]:
         Column("d_min_true", ("d_min_m",)),
         Column("sigma_min_B_tilde", ("sigma_min_B_tilde",)),
         Column("sigma_min_A_hat", ("sigma_min_A_hat",)),
+        Column("singular_nearness", ("singular_nearness",)),
+        Column("singular_shape", ("singular_shape",), "text"),
         Column("fallen", ("fallen",), "flag"),
         Column("slip", each("slip_{}_m_s", robot.wheeled_links)),
         Column("step_time_s", ("step_time_s",)),

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snake_control.experiment.series import HEAD_COMPONENTS, HEAD_UNITS, Series, pose_error
+from snake_control.model.singular_shape import SINGULAR_ABOVE
 
 Array = NDArray[np.float64]
 
@@ -199,6 +200,29 @@ def _stability(series: Series) -> dict[str, Any]:
     start = float(V_b1[known[0]]) if len(known) else math.nan
     found["start_V_b1"] = start
     found["min_V_b1_over_start"] = found["min_V_b1"] / start if start > 0 else None
+    return {**found, **_singularity(series)}
+
+
+def _singularity(series: Series) -> dict[str, Any]:
+    t, nearness = series.numbers("t_s"), series.numbers("singular_nearness")
+    known = np.flatnonzero(np.isfinite(nearness))
+    found: dict[str, Any] = dict.fromkeys(
+        (
+            "max_singular_nearness",
+            "max_singular_nearness_at_s",
+            "max_singular_nearness_shape",
+            "singular_at_s",
+        )
+    )
+    if not len(known):
+        return found
+    most = known[np.argmax(nearness[known])]
+    found["max_singular_nearness"] = float(nearness[most])
+    found["max_singular_nearness_at_s"] = float(t[most])
+    found["max_singular_nearness_shape"] = series.texts("singular_shape")[most]
+    singular = np.flatnonzero(nearness > SINGULAR_ABOVE)
+    if len(singular):
+        found["singular_at_s"] = float(t[singular[0]])
     return found
 
 

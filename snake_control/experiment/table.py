@@ -22,6 +22,7 @@ def format_summary(summary: Mapping[str, Any]) -> str:
         _line("min d_min", _at(_number(summary["min_d_min_m"], "mm", 1, 1e3), summary, "d_min")),
         _line("min V_b1", _at(_exponential(summary["min_V_b1"]), summary, "V_b1")),
         _line("  of its start", _number(summary["min_V_b1_over_start"], "%", 2, 100.0)),
+        _line("singular shape", _singular(summary)),
         *_limits(summary["limits"]),
         *_control(summary["control"]),
         *_bus(summary["bus"]),
@@ -101,6 +102,20 @@ def _fell(summary: Mapping[str, Any]) -> str:
     return f"at {_number(summary['fell_at_s'], 's', 1)}" if summary["fell"] else "no"
 
 
+def _singular(summary: Mapping[str, Any]) -> str:
+    nearness = summary["max_singular_nearness"]
+    if nearness is None:
+        return "-"
+    text = _at(
+        f"nearness up to {nearness:.3f} ({summary['max_singular_nearness_shape']})",
+        summary,
+        "singular_nearness",
+        "max",
+    )
+    since = summary["singular_at_s"]
+    return text if since is None else f"{text}; singular from {since:.1f} s"
+
+
 def _line(name: str, value: str) -> str:
     return f"{name:20}{value}"
 
@@ -113,6 +128,6 @@ def _exponential(value: float | None) -> str:
     return "-" if value is None else f"{value:.3g}"
 
 
-def _at(text: str, summary: Mapping[str, Any], name: str) -> str:
-    when = summary[f"min_{name}_at_s"]
+def _at(text: str, summary: Mapping[str, Any], name: str, extreme: str = "min") -> str:
+    when = summary[f"{extreme}_{name}_at_s"]
     return text if when is None else f"{text} at {when:.1f} s"

@@ -11,6 +11,7 @@ from snake_control.config import RobotConfig
 from snake_control.model.geometry import Geometry, geometry
 from snake_control.model.manipulability import V_h
 from snake_control.model.redundancy import Kinematics, kinematics
+from snake_control.model.singular_shape import SingularShape, singular_shape
 from snake_control.model.singularity import log_V_b1
 from snake_control.model.stability import Support, support
 
@@ -79,6 +80,11 @@ class Posture:
         """Gradient of V_b1; not finite where V_b1 is infinite."""
         with np.errstate(over="ignore", invalid="ignore"):
             return self.V_b1 * self.log_V_b1_gradient
+
+    @functools.cached_property
+    def singular_shape(self) -> SingularShape:
+        """The singular shape of Fig. 5 that is next, and how near it is."""
+        return singular_shape(self.g)
 
     @functools.cached_property
     def support(self) -> Support:

@@ -201,6 +201,8 @@ def _step(
         d_min=controller.d_min,
         sigma_min_B_tilde=controller.sigma_min_b_tilde,
         sigma_min_A_hat=controller.sigma_min_a_hat,
+        singular_nearness=controller.singular_nearness,
+        singular_shape=controller.singular_shape,
         w=None if truth is None else truth.w,
         phi=None if truth is None else truth.phi,
         d_min_true=math.nan if truth is None else truth.nearest.d_min,

@@ -13,6 +13,7 @@ from snake_control.config import ControllerConfig
 from snake_control.control.reference import Reference
 from snake_control.control.scp_controller import ScpController
 from snake_control.experiment.lockstep import LockstepSample, lockstep
+from snake_control.model.singular_shape import SINGULAR_ABOVE, ShapeKind
 from snake_control.plant.kinematic import KinematicPlant
 from support.robots import PAPER, REFERENCE
 
@@ -63,6 +64,17 @@ def test_case_1_turns_singular():
     assert np.median([s.result.V_b1 for s in late(1)]) < 0.01 * start
     assert max(abs(s.state.phi[10]) for s in run(1)) > 6.0
     np.testing.assert_array_equal(run(1)[-1].result.phi_tilde_dot_d, 0.0)
+
+
+def test_the_nearness_of_a_singular_shape_tells_the_cases_apart():
+    nearness = {c: np.array([s.result.singular_shape.nearness for s in run(c)]) for c in (1, 2, 3)}
+    assert nearness[1].max() > 0.99
+    assert run(1)[-1].result.singular_shape.kind is ShapeKind.PARALLEL
+    # The paper's robot turned singular by 24.8 s.
+    assert run(1)[np.argmax(nearness[1] > SINGULAR_ABOVE)].t == pytest.approx(24.8, abs=2.0)
+    for case in (2, 3):
+        assert nearness[case].max() < 0.92
+        assert max(s.result.singular_shape.nearness for s in late(case)) < 0.8
 
 
 def test_cases_2_and_3_stay_away_from_singularity():

@@ -71,7 +71,7 @@ def test_reference_is_broken_and_the_fall_marked_in_every_panel():
 
 
 def test_d_min_is_in_millimetres():
-    _, lower = figures.base_costs(moving(ROBOT)).get_axes()
+    *_, lower = figures.base_costs(moving(ROBOT)).get_axes()
     assert np.max(lower.get_lines()[0].get_ydata()) == pytest.approx(30.0)
 
 
@@ -85,7 +85,7 @@ def test_motion_shows_as_many_moments_as_there_are():
 
 def test_series_without_ground_truth_shows_what_was_measured():
     series = moving(ROBOT, truth=False)
-    _, lower = figures.base_costs(series).get_axes()
+    *_, lower = figures.base_costs(series).get_axes()
     assert lower.get_legend() is None
     assert len(lower.get_lines()) == 2  # d_min and the floor of it
     assert len(motion(series).get_axes()) == 14

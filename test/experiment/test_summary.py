@@ -117,6 +117,20 @@ def test_stability_figures():
     assert found["min_V_b1_over_start"] == pytest.approx(0.015)
 
 
+def test_singularity_is_named_with_its_time():
+    def change(t):
+        nearness = {0.0: 0.5, 1.0: np.nan, 2.0: 0.96, 3.0: 0.98, 4.0: 0.3}[t]
+        return {"singular_nearness": nearness, "singular_shape": "parallel" if t == 3.0 else "arc"}
+
+    found = summarise(series_of([0.0, 1.0, 2.0, 3.0, 4.0], change), RUN)
+    assert found["max_singular_nearness"] == 0.98
+    assert found["max_singular_nearness_at_s"] == 3.0
+    assert found["max_singular_nearness_shape"] == "parallel"
+    assert found["singular_at_s"] == 2.0
+    assert "0.980 (parallel) at 3.0 s; singular from 2.0 s" in format_summary(found)
+    assert summarise(series_of([0.0]), RUN)["singular_at_s"] is None
+
+
 def test_first_fall_counts():
     found = summarise(series_of([0.0, 1.0, 2.0, 3.0], lambda t: {"fallen": t >= 2.0}), RUN)
     assert found["fell"] is True
