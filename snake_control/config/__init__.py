@@ -10,6 +10,7 @@ from snake_control.config.command_line import (
     parameter_files,
     parameters_of_node,
 )
+from snake_control.config.controller import ControllerConfig
 from snake_control.config.loader import (
     Config,
     from_parameters,
@@ -25,13 +26,19 @@ from snake_control.config.nodes import (
     ScpControllerConfig,
     TrajectoryGeneratorConfig,
 )
+from snake_control.config.obstacles import Circle
 from snake_control.config.parameter import Parameter
-from snake_control.config.robot import CASES, ControllerConfig, RobotConfig, ServosConfig
+from snake_control.config.presets import PRESETS
+from snake_control.config.robot import RobotConfig, ServosConfig
+from snake_control.config.sub_tasks import BASE_SUB_TASKS, HEAD_SUB_TASKS
 from snake_control.config.yaml_file import matches, read_sections
 
 __all__ = [
-    "CASES",
+    "BASE_SUB_TASKS",
+    "HEAD_SUB_TASKS",
+    "PRESETS",
     "BusDriverConfig",
+    "Circle",
     "Config",
     "ControllerConfig",
     "MockBusConfig",

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from snake_control.config.controller import ControllerConfig
 from snake_control.config.nodes import (
     BusDriverConfig,
     MockBusConfig,
@@ -16,7 +17,7 @@ from snake_control.config.nodes import (
     TrajectoryGeneratorConfig,
 )
 from snake_control.config.parameter import Parameter, parameters
-from snake_control.config.robot import ControllerConfig, RobotConfig, ServosConfig
+from snake_control.config.robot import RobotConfig, ServosConfig
 from snake_control.config.yaml_file import matches, read_sections
 from snake_control.errors import ConfigError
 

@@ -113,10 +113,15 @@ def parameter(
 
 
 def parameters(group: type) -> dict[str, Parameter]:
-    """Return the parameters of a configuration group by name, in order of declaration."""
+    """Return the parameters of a configuration group by name, in order of declaration.
+
+    Fields that were not declared by ``parameter`` are none.
+    """
     hints = typing.get_type_hints(group)
     found = {}
     for field in dataclasses.fields(group):
+        if not field.metadata:
+            continue
         kind = hints[field.name]
         if typing.get_origin(kind) in (typing.Union, types.UnionType):
             kind = next(arg for arg in typing.get_args(kind) if arg is not type(None))

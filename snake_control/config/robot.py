@@ -1,11 +1,9 @@
-"""The shared groups of the configuration: the robot, its servos, and the controller's gains."""
+"""The shared groups of the configuration that describe the hardware: the robot and its servos."""
 
 from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping
-from types import MappingProxyType
 from typing import TypeVar
 
 from snake_control.config.conditions import check_conditions
@@ -295,108 +293,3 @@ class ServosConfig:
                 values = getattr(config, field.name)
                 changes[field.name] = per_joint(f"servos.{field.name}", values, joints)
         return dataclasses.replace(config, **changes)  # type: ignore[arg-type]
-
-
-CASES: Mapping[int, Mapping[str, float]] = MappingProxyType(
-    {
-        1: MappingProxyType({"a_h": 0.0, "a_b": 0.0, "a_prime": 0.0, "b_prime": 0.0}),
-        2: MappingProxyType({"a_h": 1e5, "a_b": 1.0, "a_prime": 1e-11, "b_prime": 0.0}),
-        3: MappingProxyType({"a_h": 1e5, "a_b": 1.0, "a_prime": 1e-11, "b_prime": 3.0}),
-    }
-)
-"""Sub-task weights of the paper's Cases 1 to 3 (Section 5)."""
-
-
-@dataclasses.dataclass(frozen=True)
-class ControllerConfig:
-    """Gains of the SCP redundancy controller, equations (22), (25), (27), (30)."""
-
-    case: int = parameter(
-        3,
-        "preset of sub-task weights: 1 SCPs still, 2 singularity avoidance, 3 and no falling",
-        choices=(1, 2, 3),
-        run_time=True,
-    )
-    K: tuple[float, ...] = parameter(
-        (0.4, 0.25, 0.5, 0.1, 0.1, 0.1),
-        "diagonal of K for x_h, y_h, z_h, R, P, Y [1/s]; zeros for the SCPs may follow",
-        low=0.0,
-        high=100.0,
-        run_time=True,
-    )
-    K_p: tuple[float, ...] = parameter(
-        (4.0,),
-        "torque control (21): gain on the error of x_h, y_h, z_h, R, P, Y, or one for all [1/s^2]; "
-        "zeros for the SCPs may follow",
-        low=0.0,
-        high=1e6,
-        run_time=True,
-    )
-    K_v: tuple[float, ...] = parameter(
-        (4.0,),
-        "torque control (21): gain on the velocity error of x_h, y_h, z_h, R, P, Y and each SCP, "
-        "or one for all [1/s]",
-        low=0.0,
-        high=1e6,
-        run_time=True,
-    )
-    a_h: float = parameter(
-        None,
-        "gain of the H-SCP sub-task (25); default from the case",
-        low=0.0,
-        high=1e12,
-        run_time=True,
-    )
-    a_b: float = parameter(
-        None,
-        "gain of the B-SCP sub-task (27); default from the case",
-        low=0.0,
-        high=1e12,
-        run_time=True,
-    )
-    a_prime: float = parameter(
-        None,
-        "weight of V_b1 in (30); default from the case",
-        low=0.0,
-        high=1e12,
-        run_time=True,
-    )
-    b_prime: float = parameter(
-        None,
-        "weight of d_min in (30) [1/m]; default from the case",
-        low=0.0,
-        high=1e12,
-        run_time=True,
-    )
-
-    def __post_init__(self) -> None:
-        for name, value in CASES[self.case].items():
-            if getattr(self, name) is None:
-                object.__setattr__(self, name, value)
-
-    @staticmethod
-    def for_scps(config: ControllerConfig, m: int) -> ControllerConfig:
-        """Return ``config`` with K and K_p cut to w, checked against ``m`` SCPs.
-
-        Raises:
-            ConfigError: another number of gains, or one that feeds back an SCP angle.
-        """
-        if len(config.K_v) not in (1, 6 + m):
-            raise ConfigError(
-                "controller.K_v", list(config.K_v), f"give one gain for all, or 6 + m = {6 + m}"
-            )
-        K_p = config.K_p if len(config.K_p) == 1 else _of_w("controller.K_p", config.K_p, m)
-        return dataclasses.replace(config, K=_of_w("controller.K", config.K, m), K_p=K_p)
-
-
-def _of_w(field: str, gains: tuple[float, ...], m: int) -> tuple[float, ...]:
-    """Return the six gains of w; those of the ``m`` SCPs, where given, must be 0."""
-    if len(gains) not in (6, 6 + m):
-        raise ConfigError(field, list(gains), f"give 6 gains, or 6 + m = {6 + m}")
-    if any(gains[6:]):
-        raise ConfigError(
-            field,
-            list(gains),
-            "the gains of the SCPs must be 0: (25) and (27) give them velocities, not angles",
-        )
-    return gains[:6]

@@ -32,6 +32,24 @@ _RclLoader.add_implicit_resolver(
 )
 
 
+def read_yaml(path: str | Path) -> Any:
+    """Return what a YAML file holds, numbers read as rcl reads them; ``None`` if it is empty.
+
+    Raises:
+        ConfigFileError: the file is missing, is no text in UTF-8, or no YAML.
+    """
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+    except OSError as error:
+        raise ConfigFileError(str(path), f"cannot be read: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise ConfigFileError(str(path), "is no text in UTF-8") from error
+    try:
+        return yaml.load(text, Loader=_RclLoader)
+    except yaml.YAMLError as error:
+        raise ConfigFileError(str(path), f"is not valid YAML: {error}") from error
+
+
 def read_sections(path: str | Path) -> list[tuple[str, dict[str, Any]]]:
     """Return the sections of a ROS parameter file as (node pattern, flat parameters).
 
@@ -41,14 +59,7 @@ def read_sections(path: str | Path) -> list[tuple[str, dict[str, Any]]]:
         ConfigFileError: the file is missing, is no YAML, or has no ``ros__parameters``.
         ConfigError: a list that rcl would abort on: mixed types, empty, or of maps.
     """
-    try:
-        text = Path(path).read_text(encoding="utf-8")
-    except OSError as error:
-        raise ConfigFileError(str(path), f"cannot be read: {error.strerror}") from error
-    try:
-        tree = yaml.load(text, Loader=_RclLoader)
-    except yaml.YAMLError as error:
-        raise ConfigFileError(str(path), f"is not valid YAML: {error}") from error
+    tree = read_yaml(path)
     if tree is None:
         return []
     if not isinstance(tree, Mapping):

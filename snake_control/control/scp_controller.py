@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from snake_control.config import ControllerConfig, RobotConfig
 from snake_control.control.limits import JointLimits
 from snake_control.control.reference import Reference
-from snake_control.control.sub_tasks import base_scp_velocities, head_scp_velocities
+from snake_control.control.sub_tasks import Composition
 from snake_control.errors import SingularError
 from snake_control.model.posture import Posture
 from snake_control.model.redundancy import joint_velocities
@@ -73,10 +73,13 @@ class ScpController:
 
         Args:
             robot: the robot.
-            controller: gains; K is the diagonal for the head (its SCP part is 0).
+            controller: gains and sub-tasks; K is the diagonal for the head (its SCP part is 0).
+
+        Raises:
+            ConfigError: a sub-task cannot be made.
         """
         self._robot = robot
-        self._gains = controller
+        self._sub_tasks = Composition(robot, controller)
         self._w = structure(robot).w
         self._K = np.array(controller.K[:6])[self._w]
         self._limits = JointLimits(robot)
@@ -106,13 +109,8 @@ class ScpController:
         difference[3:] = wrap(difference[3:])
         error = np.zeros(6)
         error[self._w] = difference[self._w]
-        phi_tilde_dot_d = np.concatenate(
-            (
-                head_scp_velocities(posture, self._gains),
-                base_scp_velocities(posture, self._gains),
-            )
-        )
         w_dot = reference.w_d_dot[self._w] - self._K * error[self._w]
+        phi_tilde_dot_d = self._sub_tasks.velocities(posture, w_dot)
         u = joint_velocities(k, w_dot, phi_tilde_dot_d)
         if not np.isfinite(u).all():
             raise SingularError("B_tilde", k.sigma_min_B_tilde)

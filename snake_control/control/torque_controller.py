@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from snake_control.config import ControllerConfig, RobotConfig
 from snake_control.control.reference import Reference
-from snake_control.control.sub_tasks import base_scp_velocities, head_scp_velocities
+from snake_control.control.sub_tasks import Composition
 from snake_control.errors import ModelError, SingularError
 from snake_control.model.dynamics import Dynamics
 from snake_control.model.posture import Posture
@@ -93,12 +93,12 @@ class TorqueController:
             controller: gains K_p, K_v and those of the sub-tasks.
 
         Raises:
-            ConfigError: gains that do not fit the robot.
+            ConfigError: gains that do not fit the robot, or a sub-task that cannot be made.
         """
         s = structure(robot)
         gains = ControllerConfig.for_scps(controller, s.m)
         self._robot = robot
-        self._gains = gains
+        self._sub_tasks = Composition(robot, gains)
         self._s = s
         self._dynamics = Dynamics(robot)
         self._K_p = np.broadcast_to(gains.K_p, 6)[s.w]
@@ -141,12 +141,7 @@ class TorqueController:
         difference[3:] = wrap(difference[3:])
         error[s.w] = difference[s.w]
         error_dot[s.w] = (w_dot - reference.w_d_dot)[s.w]
-        phi_tilde_dot_d = np.concatenate(
-            (
-                head_scp_velocities(posture, self._gains),
-                base_scp_velocities(posture, self._gains),
-            )
-        )
+        phi_tilde_dot_d = self._sub_tasks.velocities(posture, w_dot[s.w])
         w_tilde_ddot = np.concatenate(
             (
                 reference.w_d_ddot[s.w] - self._K_v_w * error_dot[s.w] - self._K_p * error[s.w],

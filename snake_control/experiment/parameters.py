@@ -12,6 +12,14 @@ def configuration_parameters(config: Config) -> dict[str, Any]:
     controller, trajectory = config.controller, config.trajectory_generator
     return {
         "K_1_s": list(controller.K),
+        "preset": controller.preset,
+        "head_sub_tasks": dict(
+            zip(controller.head_sub_tasks, controller.head_weights, strict=True)
+        ),
+        "base_sub_tasks": dict(
+            zip(controller.base_sub_tasks, controller.base_weights, strict=True)
+        ),
+        "scp_law": controller.scp_law,
         "a_h": controller.a_h,
         "a_b": controller.a_b,
         "a_prime": controller.a_prime,

@@ -17,7 +17,6 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
 
 from snake_control.config import (
-    CASES,
     Config,
     Parameter,
     from_parameters,
@@ -32,6 +31,7 @@ _ROS_TYPES = {
     int: ParameterType.PARAMETER_INTEGER,
     str: ParameterType.PARAMETER_STRING,
 }
+_NONE: dict[type, Any] = {int: 0, float: 0.0, str: "none"}
 
 
 class NodeParameters:
@@ -42,6 +42,7 @@ class NodeParameters:
 
     Attributes:
         config: the snapshot in force; replaced as a whole when a parameter changes.
+        prepared: what ``prepare`` made of it.
     """
 
     def __init__(
@@ -49,6 +50,7 @@ class NodeParameters:
         node: Node,
         kind: str,
         on_change: Callable[[Config], None] | None = None,
+        prepare: Callable[[Config], Any] = lambda config: None,
     ) -> None:
         """Declare all parameters of a kind of node and validate what was given.
 
@@ -56,6 +58,8 @@ class NodeParameters:
             node: the node to declare them on.
             kind: ``bus_driver``, ``pose_input``, ... (the node itself may be renamed).
             on_change: called with the new snapshot after a run-time change was accepted.
+            prepare: makes what the node needs of a snapshot; where it raises ConfigError, a change
+                is refused and everything stays as it was.
 
         Raises:
             ConfigError: names the parameter, its value and what is allowed.
@@ -64,7 +68,9 @@ class NodeParameters:
         self._kind = kind
         self._on_change = on_change
         self._known = known_parameters((kind,))
-        self._following_case = False
+        self._prepare = prepare
+        self._following = False
+        self._checked: tuple[Config, Any] | None = None
         given = {n: p.value for n, p in node.get_parameters_by_prefix("").items()}
         # A file may serve all nodes through one /** section.
         known_to_any = known_parameters(
@@ -78,6 +84,7 @@ class NodeParameters:
                 node.undeclare_parameter(name)
         self._explicit = {name: value for name, value in given.items() if name in self._known}
         self.config = from_parameters(kind, self._explicit)
+        self.prepared = prepare(self.config)
         for name, item in self._known.items():
             if name in given:
                 node.set_descriptor(name, _descriptor(item))
@@ -87,43 +94,53 @@ class NodeParameters:
         node.add_post_set_parameters_callback(self._take_change)
 
     def _effective(self, name: str) -> Any:
-        """Value in force of a parameter nobody gave; None where an empty list is meant."""
+        """Value in force of a parameter nobody gave."""
         item = self._known[name]
         value = item.default
         if value is None:
-            value = CASES[self.config.controller.case][name.rpartition(".")[2]]
-        return list(value) if item.is_list else value
+            group, _, field = name.rpartition(".")
+            value = getattr(getattr(self.config, group), field)
+        if not item.is_list:
+            return value
+        # A ROS parameter holds no empty list.
+        return list(value) or [_NONE[item.kind]]
 
     def _check_change(self, changed: Iterable[RosParameter]) -> SetParametersResult:
+        if self._following:
+            return SetParametersResult(successful=True)
+        values = self._ours(changed)
         try:
-            from_parameters(self._kind, self._explicit | self._ours(changed))
+            config = from_parameters(self._kind, self._explicit | values)
+            self._checked = config, self._prepare(config)
         except ConfigError as error:
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
 
     def _take_change(self, changed: Iterable[RosParameter]) -> None:
         values = self._ours(changed)
-        if not values or self._following_case:
+        if not values or self._following:
             return
+        assert self._checked is not None
+        # What was checked is what is taken: files that it names may have changed since.
+        self.config, self.prepared = self._checked
         self._explicit |= values
-        self.config = from_parameters(self._kind, self._explicit)
-        if "controller.case" in values:
-            self._follow_case()
+        if any(name.startswith("controller.") for name in values):
+            self._follow()
         if self._on_change is not None:
             self._on_change(self.config)
 
-    def _follow_case(self) -> None:
-        """Show the weights that the new case sets, without making them explicit ones."""
+    def _follow(self) -> None:
+        """Show what follows from a change, without making it explicit."""
         followers = [
             RosParameter(name, value=self._effective(name))
             for name, item in self._known.items()
             if item.default is None and name not in self._explicit
         ]
-        self._following_case = True
+        self._following = True
         try:
             self._node.set_parameters(followers)
         finally:
-            self._following_case = False
+            self._following = False
 
     def _ours(self, changed: Iterable[RosParameter]) -> dict[str, Any]:
         return {p.name: p.value for p in changed if p.name in self._known}

@@ -46,11 +46,17 @@ class ScpControllerNode(Node):
 
     def __init__(self, **overrides: Any) -> None:
         super().__init__("scp_controller", **overrides)
-        config = NodeParameters(self, "scp_controller", self._on_parameters).config
+        self._configured = NodeParameters(
+            self,
+            "scp_controller",
+            self._on_parameters,
+            lambda config: ScpController(config.robot, config.controller),
+        )
+        config = self._configured.config
         self._robot = config.robot
         self._own = own = config.scp_controller
         self._case = config.controller.case
-        self._controller = ScpController(config.robot, config.controller)
+        self._controller: ScpController = self._configured.prepared
         self._enabled = own.enabled
         self._status: int | None = None
         self._messages = ControllerMessages(config.robot, own.frame_id)
@@ -94,7 +100,7 @@ class ScpControllerNode(Node):
 
     def _on_parameters(self, config: Config) -> None:
         self._case = config.controller.case
-        self._controller = ScpController(config.robot, config.controller)
+        self._controller = self._configured.prepared
         self.get_logger().info(f"gains changed: {config.controller}")
 
     def _on_enable(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:

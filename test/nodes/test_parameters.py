@@ -1,5 +1,7 @@
 """Parameters of a running node, and how a node refuses to start with wrong ones."""
 
+import os
+
 import pytest
 from snake_interfaces.msg import ControllerState
 
@@ -63,6 +65,53 @@ def test_a_weight_given_explicitly_survives_a_change_of_case(running):
     assert running.get_parameter(NODE, "controller.a_h") == 0.0
 
 
+def test_sub_tasks_change_while_running_and_their_weights_follow(tmp_path, monkeypatch):
+    module = tmp_path / "my_sub_tasks.py"
+    module.write_text(
+        "from snake_control.control.sub_tasks import SubTask\n"
+        "class Lazy(SubTask):\n"
+        "    def value(self, posture): return 0.0\n"
+        "    def gradient(self, posture): return 0.0 * posture.g.q\n"
+    )
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path), prepend=os.pathsep)
+    obstacles = tmp_path / "obstacles.yaml"
+    obstacles.write_text("- {x_m: 1.0, y_m: 1.0, radius_m: 0.1}\n")
+    with Graph() as graph:
+        graph.start(NODE, params_files=[PAPER_ROBOT])
+
+        def now(name):
+            return list(graph.get_parameter(NODE, f"controller.{name}"))
+
+        def change(**values):
+            (result,) = graph.set_parameters(NODE, **values).values()
+            return result
+
+        assert now("base_sub_tasks") == ["singularity", "fall"]
+        assert now("base_weights") == [1e-11, 3.0]
+        assert change(controller__preset="scale_free").successful
+        assert now("base_sub_tasks") == ["wheel_axes", "relative_fall", "joint_range"]
+        assert change(controller__base_sub_tasks=["fall", "my_sub_tasks:Lazy"]).successful
+        assert now("base_weights") == [3.0, 1.0]
+        assert graph.get_parameter(NODE, "controller.b_prime") == 3.0
+        for values, reason in (
+            ({"controller__base_sub_tasks": ["fal"]}, "allowed: singularity"),
+            ({"controller__base_sub_tasks": ["my_sub_tasks:Busy"]}, "no class Busy"),
+            ({"controller__base_sub_tasks": ["obstacles"]}, "obstacles_file"),
+            ({"controller__obstacles_file": "/nowhere.yaml"}, "cannot be read"),
+            ({"controller__base_weights": [1.0, 2.0, 3.0]}, "one weight for each"),
+            ({"controller__a_prime": 1.0}, "not among the base sub-tasks"),
+        ):
+            result = change(**values)
+            assert not result.successful
+            assert reason in result.reason
+        assert now("base_sub_tasks") == ["fall", "my_sub_tasks:Lazy"]
+        assert change(controller__base_sub_tasks=["none"]).successful
+        assert now("base_weights") == [0.0]
+        assert change(controller__obstacles_file=str(obstacles)).successful
+        assert change(controller__base_sub_tasks=["obstacles"]).successful
+        assert now("base_weights") == [0.1]
+
+
 @pytest.mark.parametrize(
     ("name", "value", "reason"),
     [
@@ -105,6 +154,11 @@ BROKEN = [
         "mixed lists",
     ),
     ("scp_controller", "/**:\n  ros__parameters:\n    robot: {head_links: 3}\n", "Condition 5"),
+    (
+        "scp_controller",
+        "/**:\n  ros__parameters:\n    controller: {base_sub_tasks: ['nowhere:Task']}\n",
+        "controller.base_sub_tasks[0] = 'nowhere:Task': cannot import nowhere",
+    ),
     (
         "scp_controller",
         "/**:\n  ros__parameters:\n    robot: {wheelless_links: []}\n",

@@ -1,0 +1,26 @@
+"""V_b1 without its scale."""
+
+from __future__ import annotations
+
+from snake_control.control.sub_tasks.sub_task import Array, SubTask
+from snake_control.model.posture import Posture
+
+
+class LogSingularity(SubTask):
+    """V = log V_b1 (30), without unit.
+
+    The gradient grows as 1 / sigma_min towards a singular posture and is finite in every posture
+    that numbers can hold; where V_b1 is exactly 0 (V = -inf) it is 0.
+
+    On its own it does not keep the paper's robot from turning singular: V_b1 also counts how much
+    the constraints amplify motions along the body, and rises while the body folds up.
+    ``WheelAxes`` looks at the singular shapes alone.
+    """
+
+    def value(self, posture: Posture) -> float:
+        """Return log V_b1; -inf in a singular posture."""
+        return posture.log_V_b1
+
+    def gradient(self, posture: Posture) -> Array:
+        """Return the gradient of log V_b1."""
+        return posture.log_V_b1_gradient
