@@ -10,7 +10,7 @@ from pathlib import Path
 
 from snake_control.config import Config
 from snake_control.experiment.cases import CASES, load_case
-from snake_control.experiment.run import SERVOS, Settings
+from snake_control.experiment.run import CONTROLLERS, SERVOS, TORQUE_RATE_HZ, Settings
 
 _RATE_LIMITS_HZ = (1.0, 10000.0)
 
@@ -28,6 +28,7 @@ class ExperimentArguments:
         plant_step_s: longest step of the plant [s].
         servos: ``perfect`` or ``limited``.
         carry_remainder: whether limited servos carry what rounding leaves.
+        controller: ``velocity`` or ``torque``.
         internal_motion: only draw the internal motion.
         figures: whether to draw the figures of each case.
     """
@@ -40,6 +41,7 @@ class ExperimentArguments:
     plant_step_s: float
     servos: str
     carry_remainder: bool
+    controller: str
     internal_motion: bool
     figures: bool
 
@@ -55,13 +57,17 @@ class ExperimentArguments:
 
     def settings(self, config: Config) -> Settings:
         """Return how a configuration is to be run."""
-        rate_hz = config.scp_controller.rate_hz if self.rate_hz is None else self.rate_hz
+        rate_hz = self.rate_hz
+        if rate_hz is None:
+            torque = self.controller == "torque"
+            rate_hz = TORQUE_RATE_HZ if torque else config.scp_controller.rate_hz
         return Settings(
             duration_s=self.duration_s,
             rate_hz=rate_hz,
             plant_step_s=self.plant_step_s,
             servos=self.servos,
             carry_remainder=self.carry_remainder,
+            controller=self.controller,
         )
 
     def directory(self, case: int) -> Path:
@@ -127,17 +133,25 @@ def parse_arguments(argv: Sequence[str] | None = None) -> ExperimentArguments:
         help="limited servos lose what rounding a speed leaves, instead of carrying it on",
     )
     parser.add_argument(
+        "--controller",
+        choices=CONTROLLERS,
+        default="velocity",
+        help="velocity: (22) on a body without inertia; torque: (21) on rigid links; "
+        "default: %(default)s",
+    )
+    parser.add_argument(
         "--rate",
         type=_rate,
         metavar="HZ",
-        help="control cycles a second; default: scp_controller.rate_hz of the files (50)",
+        help="control cycles a second; default: scp_controller.rate_hz of the files "
+        f"(50), {TORQUE_RATE_HZ:g} for torque control",
     )
     parser.add_argument(
         "--plant-step",
         type=_positive,
         default=Settings().plant_step_s,
         metavar="S",
-        help="longest step of the plant; default: %(default)s s",
+        help="longest step of the body without inertia; default: %(default)s s",
     )
     parser.add_argument(
         "--no-figures", dest="figures", action="store_false", help="no figures for each case"
@@ -148,6 +162,8 @@ def parse_arguments(argv: Sequence[str] | None = None) -> ExperimentArguments:
         help="run no case; draw how the body moves while the head stands still",
     )
     given = parser.parse_args(argv)
+    if given.controller == "torque" and given.servos == "limited":
+        parser.error("--servos limited takes velocities: not with --controller torque")
     return ExperimentArguments(
         cases=given.case,
         params_files=tuple(given.params_file),
@@ -157,6 +173,7 @@ def parse_arguments(argv: Sequence[str] | None = None) -> ExperimentArguments:
         plant_step_s=given.plant_step,
         servos=given.servos,
         carry_remainder=given.carry_remainder,
+        controller=given.controller,
         internal_motion=given.internal_motion,
         figures=given.figures,
     )

@@ -120,11 +120,24 @@ class Facts:
         """Mean error of each component over the last ``END_S``, (6,) [m, rad]."""
         return self.error[self.at_end].mean(axis=0)
 
+    @property
+    def law(self) -> str:
+        """Equation that says how the error should go: (24), or that of (21)."""
+        return "(21)" if self.run.settings.controller == "torque" else "(24)"
+
     @functools.cached_property
-    def off_exponential(self) -> Array:
-        """Largest distance of each error from e(0) exp(-K t) at the end, (6,) [m, rad]."""
-        K = np.array(self.run.config.controller.K[:6])
-        ideal = self.error[0] * np.exp(-K * self.t[self.at_end, None])
+    def off_law(self) -> Array:
+        """Largest distance of each error from what ``law`` promises, at the end, (6,) [m, rad]."""
+        gains, t = self.run.config.controller, self.t[self.at_end]
+        if self.run.settings.controller == "torque":
+            # At rest at t = 0, so the error's rate is that of the reference.
+            w_d = self.run.series.numbers("w_d")
+            rate = -(w_d[1] - w_d[0]) / (self.t[1] - self.t[0])
+            K_p = np.broadcast_to(gains.K_p, 6)
+            K_v = np.broadcast_to(gains.K_v, 6) if len(gains.K_v) == 1 else np.array(gains.K_v[:6])
+            ideal = second_order(t, self.error[0], rate, K_p, K_v)
+        else:
+            ideal = self.error[0] * np.exp(-np.array(gains.K[:6]) * t[:, None])
         return np.abs(self.error[self.at_end] - ideal).max(axis=0)
 
     @property
@@ -153,3 +166,22 @@ class Facts:
         """Root mean square of the wheels' sideways velocity in the window [m/s]."""
         slip = self.run.series.numbers("slip")[self.window]
         return float(np.sqrt(np.mean(slip**2))) if np.isfinite(slip).all() else math.nan
+
+
+def second_order(t: Array, start: Array, rate: Array, K_p: Array, K_v: Array) -> Array:
+    """Return the solutions of e_ddot + K_v e_dot + K_p e = 0, (N, k).
+
+    Args:
+        t: times [s], (N,).
+        start, rate: e(0) and e_dot(0), (k,).
+        K_p, K_v: gains [1/s^2, 1/s], (k,).
+    """
+    middle = -0.5 * K_v
+    half = np.sqrt((middle**2 - K_p).astype(complex))
+    # sinh(h t) / h, which is t where both roots are one.
+    single = np.abs(half) < 1e-9
+    safe = np.where(single, 1.0, half)
+    time = t[:, None]
+    sine = np.where(single, time, np.sinh(safe * time) / safe)
+    values = np.exp(middle * time) * (start * np.cosh(half * time) + (rate - middle * start) * sine)
+    return np.asarray(values.real)

@@ -139,10 +139,10 @@ def _turns_singular(facts: Facts) -> _Judged:
 
 @_statement((1,), "x_h therefore left its target (Fig. 8).")
 def _left_behind(facts: Facts) -> _Judged:
-    error = float(facts.off_exponential[0])
+    error = float(facts.off_law[0])
     found = (
-        f"Over the last {END_S:.0f} s x_h was up to {_mm(error)} off the error that (24) promises "
-        f"({_LEFT_BEHIND_M * 1e3:.0f} mm or more would count as left)."
+        f"Over the last {END_S:.0f} s x_h was up to {_mm(error)} off the error that {facts.law} "
+        f"promises ({_LEFT_BEHIND_M * 1e3:.0f} mm or more would count as left)."
     )
     why = (
         "In a singular posture the wheels no longer tell how far the robot rolls (A_hat loses "
@@ -160,7 +160,7 @@ def _fall(facts: Facts, case: int) -> _Judged:
     fell = "did not fall" if at is None else f"fell at {at:.1f} s"
     found = f"The robot {fell}; the smallest d_min was {_mm(margin)}, at {margin_at:.1f} s."
     why = (
-        "This plant has no inertia, no shaking and no play: it falls only when P_G leaves the "
+        "Nothing shakes here and no joint has play: the robot falls only when P_G leaves the "
         f"support polygon. The hardware fell at {_PAPER_FELL_S[case]} s with d_min near zero."
     )
     numbers = {"fell_at_s": at, "min_d_min_m": margin, "min_d_min_at_s": margin_at}
@@ -225,14 +225,14 @@ def _grows_towards_tail(facts: Facts) -> _Judged:
 
 def _tracking(facts: Facts) -> _Judged:
     position = facts.error_at_end[:3]
-    off = facts.off_exponential[3:]
+    off = facts.off_law[3:]
     found = (
         f"Over the last {END_S:.0f} s x, y, z were within {', '.join(map(_mm, position))}, and "
-        f"R, P, Y within {off.max():.4f} rad of the exponential (24)."
+        f"R, P, Y within {off.max():.4f} rad of what {facts.law} promises."
     )
     numbers = {
         "position_error_max_m": position.tolist(),
-        "off_exponential_max_rad": off.tolist(),
+        "off_law_max_rad": off.tolist(),
     }
     holds = bool(position.max() < _TRACKED_M and off.max() < _TRACKED_RAD)
     return holds, found, numbers, ""

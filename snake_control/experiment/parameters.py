@@ -12,6 +12,8 @@ def configuration_parameters(config: Config) -> dict[str, Any]:
     controller, trajectory = config.controller, config.trajectory_generator
     return {
         "K_1_s": list(controller.K),
+        "K_p_1_s2": list(controller.K_p),
+        "K_v_1_s": list(controller.K_v),
         "preset": controller.preset,
         "head_sub_tasks": dict(
             zip(controller.head_sub_tasks, controller.head_weights, strict=True)

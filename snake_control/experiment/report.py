@@ -237,12 +237,22 @@ def _robot_words(robot: RobotConfig) -> str:
 
 
 def _how(parameters: Mapping[str, object]) -> str:
+    """Say how the runs were made: rate, servos, plant."""
+    rate = f"{parameters['control_rate_hz']:g} control cycles a second"
+    if parameters["controller"] == "torque":
+        return (
+            f"torque control (21), {rate}; joints take any torque at once. The body is made of "
+            "rigid links on massless wheels that never slip and a floor that holds it"
+        )
     if parameters["servos"] == "perfect":
         servos = "perfect servos: joints follow at once, without limits of speed or range"
     else:
         carried = "carried on" if parameters["carry_remainder"] else "lost"
         servos = (
-            "limited servos: whole position ticks (0.29°) and speed units (0.111 rpm, remainder "
-            f"{carried}), limits of speed and range, one cycle of delay"
+            "limited servos: whole position ticks (0.29 degrees) and speed units (0.111 rpm, "
+            f"remainder {carried}), limits of speed and range, one cycle of delay"
         )
-    return f"{parameters['control_rate_hz']:g} control cycles a second; {servos}"
+    return (
+        f"velocity control (22), {rate}; {servos}. The body is a chain on wheels without inertia; "
+        "where joints and wheels contradict each other, least squares decide how the wheels slip"
+    )

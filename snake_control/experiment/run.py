@@ -10,16 +10,22 @@ from typing import Any
 
 from snake_control.config import Config
 from snake_control.control.scp_controller import ControlResult, ScpController
-from snake_control.errors import SingularError
+from snake_control.control.torque_controller import TorqueController, TorqueResult
+from snake_control.errors import ModelError, SingularError
 from snake_control.experiment.lockstep import Controller, LockstepSample, Unlimited, lockstep
 from snake_control.experiment.parameters import configuration_parameters
 from snake_control.experiment.series import Series, Step
 from snake_control.experiment.servos import LimitedServos, PerfectServos, Servos
 from snake_control.experiment.summary import Run, summarise
 from snake_control.plant.kinematic import KinematicPlant
+from snake_control.plant.plant import PlantState
+from snake_control.plant.torque import TorquePlant
 from snake_control.trajectory.configured import configured_trajectory
 
 SERVOS = ("perfect", "limited")
+CONTROLLERS = ("velocity", "torque")
+TORQUE_RATE_HZ = 200.0
+"""Default of torque control: at 50 Hz held torques add errors of their own (docs/experiment.md)."""
 AFTER_FALL_S = 2.0
 """A run goes on for this long after the robot fell, so that figures show the fall."""
 
@@ -34,6 +40,8 @@ class Settings:
         plant_step_s: longest step of the plant [s].
         servos: ``perfect`` or ``limited``.
         carry_remainder: whether limited servos carry what rounding a speed leaves.
+        controller: ``velocity`` (22) on the kinematic plant, or ``torque`` (21) on the one with
+            inertia, whose actuators are perfect.
     """
 
     duration_s: float = 60.0
@@ -41,6 +49,7 @@ class Settings:
     plant_step_s: float = 0.005
     servos: str = "perfect"
     carry_remainder: bool = True
+    controller: str = "velocity"
 
     @property
     def plant_steps(self) -> int:
@@ -52,10 +61,11 @@ class Settings:
         """What a summary says about these settings."""
         limited = self.servos == "limited"
         return {
+            "controller": self.controller,
             "servos": self.servos,
             "carry_remainder": self.carry_remainder if limited else None,
             "control_rate_hz": self.rate_hz,
-            "plant_steps_per_cycle": self.plant_steps,
+            "plant_step_s": 1.0 / (self.rate_hz * self.plant_steps),
             "requested_duration_s": self.duration_s,
         }
 
@@ -101,8 +111,7 @@ def run_case(
     series = Series(config.robot, csv)
     ended, interrupted, fell_at_s = "duration reached", False, None
     try:
-        for sample in _samples(config, settings):
-            step = step_of(sample)
+        for step in _steps(config, settings):
             series.append(step)
             if not on_step(step):
                 ended, interrupted = f"interrupted at {step.t_s:.2f} s", True
@@ -112,14 +121,15 @@ def run_case(
             if fell_at_s is not None and step.t_s >= fell_at_s + AFTER_FALL_S:
                 ended = f"the robot fell at {fell_at_s:.1f} s"
                 break
-    except SingularError as error:
+    except (SingularError, ModelError) as error:
         ended = f"no answer after {len(series) / settings.rate_hz:.2f} s: {error}"
     finally:
         series.close()
     case = config.controller.case
     run = Run(
         case=case,
-        K=config.controller.K,
+        # The exponential (24) is the velocity controller's.
+        K=config.controller.K if settings.controller == "velocity" else (math.nan,) * 6,
         ended=ended,
         parameters={**settings.parameters, **configuration_parameters(config)},
     )
@@ -127,52 +137,93 @@ def run_case(
 
 
 def step_of(sample: LockstepSample[ControlResult]) -> Step:
-    """Return the row of a sample; nobody timed it, and there is no bus."""
-    state, result = sample.state, sample.result
+    """Return the row of velocity control; nobody timed it, and there is no bus."""
+    result = sample.result
     limited = result.speed_scale < 1.0 or bool(result.range_limited)
     return Step(
-        t_s=sample.t,
+        **_common(sample),
         status="limited" if limited else "tracking",
-        w_measured=result.w,
-        w_d=result.w_d,
-        phi_measured=result.phi,
         u_unlimited=result.u_unlimited,
         u=result.u,
-        phi_tilde_dot_d=result.phi_tilde_dot_d,
         speed_scale=result.speed_scale,
         speed_limited=result.speed_limited,
         range_limited=result.range_limited,
-        V_h=result.V_h,
-        V_b1=result.V_b1,
-        d_min=result.d_min,
         sigma_min_B_tilde=result.sigma_min_B_tilde,
         sigma_min_A_hat=result.sigma_min_A_hat,
         singular_nearness=result.singular_shape.nearness,
         singular_shape=result.singular_shape.kind,
-        w=state.w,
-        phi=state.phi,
-        d_min_true=state.d_min,
-        fallen=state.fallen,
-        slip=state.slip,
+        effort=sample.state.effort,
     )
 
 
-def _samples(config: Config, settings: Settings) -> Iterator[LockstepSample[ControlResult]]:
-    robot = config.robot
+def torque_step_of(sample: LockstepSample[TorqueResult]) -> Step:
+    """Return the row of torque control: u are the joint velocities that came of the torques."""
+    return Step(
+        **_common(sample),
+        status="tracking",
+        u_unlimited=sample.state.phi_dot,
+        u=sample.state.phi_dot,
+        speed_scale=1.0,
+        speed_limited=(),
+        range_limited=(),
+        sigma_min_B_tilde=math.nan,
+        sigma_min_A_hat=math.nan,
+        singular_nearness=math.nan,
+        singular_shape="",
+        effort=sample.result.u,
+    )
+
+
+def _common(sample: LockstepSample[Any]) -> dict[str, Any]:
+    state, result = sample.state, sample.result
+    return {
+        "t_s": sample.t,
+        "w_measured": result.w,
+        "w_d": result.w_d,
+        "phi_measured": result.phi,
+        "phi_tilde_dot_d": result.phi_tilde_dot_d,
+        "V_h": result.V_h,
+        "V_b1": result.V_b1,
+        "d_min": result.d_min,
+        "w": state.w,
+        "phi": state.phi,
+        "d_min_true": state.d_min,
+        "fallen": state.fallen,
+        "slip": state.slip,
+    }
+
+
+def _steps(config: Config, settings: Settings) -> Iterator[Step]:
+    """Run the configured controller, servos and plant; yield the rows."""
+    robot, start = config.robot, config.robot.start_joint_angles_rad
+    period_s = 1.0 / settings.rate_hz
+    if settings.controller == "torque":
+        body = TorquePlant(robot)
+        state: PlantState = body.reset(start)
+        goal = configured_trajectory(config.trajectory_generator, state.w)
+        law = TorqueController(robot, config.controller)
+        yield from map(
+            torque_step_of,
+            lockstep(body, state, law, goal.sample, settings.duration_s, period_s),
+        )
+        return
     plant = KinematicPlant(robot)
-    state = plant.reset(robot.start_joint_angles_rad)
+    state = plant.reset(start)
     controller: Controller[ControlResult] = ScpController(robot, config.controller)
     servos: Servos = LimitedServos(robot, settings.carry_remainder)
     if settings.servos == "perfect":
         controller, servos = Unlimited(controller), PerfectServos()
-    trajectory = configured_trajectory(config.trajectory_generator, state.w)
-    return lockstep(
-        plant,
-        state,
-        controller,
-        trajectory.sample,
-        settings.duration_s,
-        1.0 / settings.rate_hz,
-        servos,
-        settings.plant_steps,
+    goal = configured_trajectory(config.trajectory_generator, state.w)
+    yield from map(
+        step_of,
+        lockstep(
+            plant,
+            state,
+            controller,
+            goal.sample,
+            settings.duration_s,
+            period_s,
+            servos,
+            settings.plant_steps,
+        ),
     )

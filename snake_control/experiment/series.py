@@ -50,6 +50,8 @@ class Step:
         singular_shape: which: ``parallel`` or ``arc``, empty while unknown.
         fallen: whether the robot has fallen by now, in truth.
         slip: sideways velocity of each wheeled link, in truth [m/s].
+        effort: torque of each joint: commanded by torque control, else what holds the robot still
+            against gravity, in truth, (n-1,) [N m].
         step_time_s: computation time of the control step [s].
         bus_cycle_time_s, bus_rate_hz: of the latest bus cycle.
     """
@@ -77,6 +79,7 @@ class Step:
     d_min_true: float = np.nan
     fallen: bool = False
     slip: ArrayLike | None = None
+    effort: ArrayLike | None = None
     step_time_s: float = np.nan
     bus_cycle_time_s: float = np.nan
     bus_rate_hz: float = np.nan
@@ -140,6 +143,7 @@ def columns(robot: RobotConfig) -> tuple[Column, ...]:
         Column("singular_shape", ("singular_shape",), "text"),
         Column("fallen", ("fallen",), "flag"),
         Column("slip", each("slip_{}_m_s", robot.wheeled_links)),
+        Column("effort", each("effort_{}_n_m", joints)),
         Column("step_time_s", ("step_time_s",)),
         Column("bus_cycle_time_s", ("bus_cycle_time_s",)),
         Column("bus_rate_hz", ("bus_rate_hz",)),

@@ -208,6 +208,7 @@ def _step(
         d_min_true=math.nan if truth is None else truth.nearest.d_min,
         fallen=truth is not None and truth.nearest.fallen,
         slip=None if truth is None else truth.nearest.slip,
+        effort=None if truth is None else truth.nearest.effort,
         step_time_s=controller.step_time,
         bus_cycle_time_s=math.nan if bus is None else bus.cycle_time,
         bus_rate_hz=math.nan if bus is None else bus.cycle_rate,

@@ -31,6 +31,12 @@ def test_defaults_are_one_case_of_the_papers_robot_with_perfect_servos():
 
 
 def test_all_cases_side_by_side(tmp_path, capsys):
+    (tmp_path / "case_3").mkdir()
+    stale = [tmp_path / "case_3" / "fig10_head_pose.png", tmp_path / "series.csv"]
+    for path in stale:
+        path.write_text("of another run")
+    (tmp_path / "notes.txt").write_text("mine")
+
     assert main(["--case", "all", "--out", str(tmp_path), "--no-figures", *QUICK]) == 0
     for case in (1, 2, 3):
         directory = tmp_path / f"case_{case}"
@@ -43,6 +49,8 @@ def test_all_cases_side_by_side(tmp_path, capsys):
     shown = capsys.readouterr()
     assert "times real time" in shown.out
     assert shown.err == ""  # no progress bar where nobody looks
+    assert not any(path.exists() for path in stale)
+    assert (tmp_path / "notes.txt").read_text() == "mine"
 
 
 def test_one_case_writes_what_the_demo_writes(tmp_path):
@@ -70,17 +78,6 @@ def test_one_case_writes_what_the_demo_writes(tmp_path):
     assert (parameters["servos"], parameters["carry_remainder"]) == ("limited", False)
 
 
-def test_results_of_another_run_do_not_stay(tmp_path):
-    (tmp_path / "case_3").mkdir()
-    stale = [tmp_path / "case_3" / "fig10_head_pose.png", tmp_path / "series.csv"]
-    for path in stale:
-        path.write_text("old")
-    (tmp_path / "notes.txt").write_text("mine")
-    assert main(["--case", "1,2", "--no-figures", "--out", str(tmp_path), *QUICK]) == 0
-    assert not any(path.exists() for path in stale)
-    assert (tmp_path / "notes.txt").read_text() == "mine"
-
-
 def test_internal_motion_is_drawn(tmp_path, capsys):
     assert main(["--internal-motion", "--out", str(tmp_path)]) == 0
     assert [path.name for path in tmp_path.iterdir()] == ["internal_motion.png"]
@@ -96,6 +93,7 @@ def test_internal_motion_is_drawn(tmp_path, capsys):
         ["--rate", "0.5"],
         ["--plant-step", "nan"],
         ["--servos", "magic"],
+        ["--servos", "limited", "--controller", "torque"],
     ],
 )
 def test_wrong_command_lines_end_with_usage(wrong, capsys):

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from snake_control.experiment.cases import case_files, load_case
+from snake_control.experiment.facts import Facts
 from snake_control.experiment.run import AFTER_FALL_S, Settings, run_case
 from snake_control.experiment.series import Series
 from support.robots import CONFIG
@@ -84,6 +85,26 @@ def test_perfect_servos_know_no_limits_and_limited_ones_do():
     assert np.abs(paper_run(1, "limited").series.phi).max() <= 2.6
     assert paper_run(1).summary["limits"]["speed_limit_steps"] == 0
     assert paper_run(1, "limited").summary["limits"]["speed_limit_steps"] > 0
+
+
+def test_torque_control_runs_on_the_body_with_inertia():
+    settings = Settings(duration_s=0.1, rate_hz=500.0, controller="torque")
+    run = run_case(load_case((), 3), settings)
+    assert run.summary["ended"] == "duration reached"
+    assert run.summary["parameters"]["controller"] == "torque"
+    assert set(run.summary["error_from_exponential_max_from_40_s"].values()) == {None}
+    effort = run.series.numbers("effort")
+    assert 0.3 < np.abs(effort).max() < 1.5
+    np.testing.assert_array_less(np.abs(run.series.numbers("u")[0]), 1e-12)  # starts at rest
+    facts = Facts(run)
+    assert facts.law == "(21)"
+    assert facts.off_law.max() < 5e-3
+
+
+def test_torques_held_too_long_end_the_run_in_words():
+    run = run_case(load_case((), 3), Settings(duration_s=5.0, rate_hz=20.0, controller="torque"))
+    assert run.summary["ended"].startswith("no answer after")
+    assert len(run.series) > 0
 
 
 def test_planar_snake_runs():
