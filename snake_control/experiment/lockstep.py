@@ -80,7 +80,6 @@ def lockstep(
     duration_s: float,
     dt: float,
     servos: Servos | None = None,
-    plant_steps: int = 1,
 ) -> Iterator[LockstepSample[Result_co]]:
     """Run a controller against a plant.
 
@@ -93,7 +92,6 @@ def lockstep(
         dt: control cycle [s].
         servos: what stands between controller and joints; perfect ones, which pass velocities or
             torques on as they are, by default.
-        plant_steps: steps of the plant in each control cycle.
 
     Yields:
         One sample for each cycle, the last one at ``duration_s``.
@@ -112,6 +110,4 @@ def lockstep(
         yield LockstepSample(t, state, result)
         if step == steps:
             return
-        command = servos.command(result.u, state.phi, dt)
-        for _ in range(plant_steps):
-            state = plant.step(command, dt / plant_steps)
+        state = plant.step(servos.command(result.u, state.phi, dt), dt)

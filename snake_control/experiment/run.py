@@ -19,7 +19,7 @@ from snake_control.experiment.servos import LimitedServos, PerfectServos, Servos
 from snake_control.experiment.summary import Run, summarise
 from snake_control.plant.kinematic import KinematicPlant
 from snake_control.plant.plant import PlantState
-from snake_control.plant.torque import TorquePlant
+from snake_control.plant.torque import MAX_SUBSTEP_S, TorquePlant
 from snake_control.trajectory.configured import configured_trajectory
 
 SERVOS = ("perfect", "limited")
@@ -37,7 +37,7 @@ class Settings:
     Attributes:
         duration_s: length of the run [s].
         rate_hz: control cycles per second.
-        plant_step_s: longest step of the plant [s].
+        plant_step_s: longest step in which the body without inertia is integrated [s].
         servos: ``perfect`` or ``limited``.
         carry_remainder: whether limited servos carry what rounding a speed leaves.
         controller: ``velocity`` (22) on the kinematic plant, or ``torque`` (21) on the one with
@@ -52,11 +52,6 @@ class Settings:
     controller: str = "velocity"
 
     @property
-    def plant_steps(self) -> int:
-        """Steps of the plant in each control cycle."""
-        return max(1, math.ceil(1.0 / (self.rate_hz * self.plant_step_s) - 1e-9))
-
-    @property
     def parameters(self) -> dict[str, Any]:
         """What a summary says about these settings."""
         limited = self.servos == "limited"
@@ -65,7 +60,7 @@ class Settings:
             "servos": self.servos,
             "carry_remainder": self.carry_remainder if limited else None,
             "control_rate_hz": self.rate_hz,
-            "plant_step_s": 1.0 / (self.rate_hz * self.plant_steps),
+            "plant_step_s": self.plant_step_s if self.controller == "velocity" else MAX_SUBSTEP_S,
             "requested_duration_s": self.duration_s,
         }
 
@@ -207,7 +202,7 @@ def _steps(config: Config, settings: Settings) -> Iterator[Step]:
             lockstep(body, state, law, goal.sample, settings.duration_s, period_s),
         )
         return
-    plant = KinematicPlant(robot)
+    plant = KinematicPlant(robot, settings.plant_step_s)
     state = plant.reset(start)
     controller: Controller[ControlResult] = ScpController(robot, config.controller)
     servos: Servos = LimitedServos(robot, settings.carry_remainder)
@@ -224,6 +219,5 @@ def _steps(config: Config, settings: Settings) -> Iterator[Step]:
             settings.duration_s,
             period_s,
             servos,
-            settings.plant_steps,
         ),
     )

@@ -32,9 +32,16 @@ class KinematicPlant:
     them, least squares decide, and what remains is the slip of each wheel.
     """
 
-    def __init__(self, robot: RobotConfig) -> None:
-        """Make a plant; call ``reset`` or it starts at the robot's start posture."""
+    def __init__(self, robot: RobotConfig, max_substep_s: float = math.inf) -> None:
+        """Make a plant; call ``reset`` or it starts at the robot's start posture.
+
+        Args:
+            robot: the robot.
+            max_substep_s: longest step of the integration, > 0 [s]; by default a step of the plant
+                is one.
+        """
         self._robot = robot
+        self._max_substep_s = max_substep_s
         self._s = structure(robot)
         self.reset(robot.start_joint_angles_rad)
 
@@ -53,13 +60,16 @@ class KinematicPlant:
             ModelError: wrong shape or not finite.
         """
         phi_dot = self._checked("joint velocities", joint_command)
-        # Midpoint rule: second order, at the price of two small least-squares problems.
-        middle, _ = self._base_velocity(self._phi, self._base, phi_dot)
-        planar, slip = self._base_velocity(
-            self._phi + 0.5 * dt * phi_dot, self._base + 0.5 * dt * middle, phi_dot
-        )
-        self._base = self._base + dt * planar
-        self._phi = self._phi + dt * phi_dot
+        steps = max(1, math.ceil(abs(dt) / self._max_substep_s - 1e-9))
+        h = dt / steps
+        for _ in range(steps):
+            # Midpoint rule: second order, at the price of two small least-squares problems.
+            middle, _ = self._base_velocity(self._phi, self._base, phi_dot)
+            planar, slip = self._base_velocity(
+                self._phi + 0.5 * h * phi_dot, self._base + 0.5 * h * middle, phi_dot
+            )
+            self._base = self._base + h * planar
+            self._phi = self._phi + h * phi_dot
         return self._state(planar, phi_dot, slip)
 
     def _base_velocity(self, phi: Array, base: Array, phi_dot: Array) -> tuple[Array, Array]:

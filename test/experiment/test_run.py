@@ -39,10 +39,7 @@ def test_summary_says_how_the_run_was_made():
     assert run.summary["tracking_error_source"] == "ground truth"
 
 
-def test_rate_and_plant_step():
-    assert Settings().plant_steps == 4
-    assert Settings(rate_hz=200.0, plant_step_s=0.005).plant_steps == 1
-    assert Settings(rate_hz=100.0, plant_step_s=0.003).plant_steps == 4
+def test_rate_sets_the_number_of_cycles():
     run = run_case(load_case((), 2), dataclasses.replace(SHORT, rate_hz=100.0))
     assert len(run.series) == 41
 

@@ -106,3 +106,14 @@ def test_falling_is_remembered():
 def test_bad_commands_are_refused(command):
     with pytest.raises(ModelError, match="11 finite"):
         KinematicPlant(PAPER).step(command, 0.01)
+
+
+def test_substeps_of_a_step_are_steps():
+    phi_dot = 0.5 * np.cos(np.arange(PAPER.joints))
+    whole, parts = KinematicPlant(PAPER, max_substep_s=0.006), KinematicPlant(PAPER)
+    for _ in range(4):
+        expected = parts.step(phi_dot, 0.005)
+    found = whole.step(phi_dot, 0.02)
+    np.testing.assert_allclose(found.w, expected.w, atol=1e-14)
+    np.testing.assert_allclose(found.slip, expected.slip, atol=1e-14)
+    assert np.abs(KinematicPlant(PAPER).step(phi_dot, 0.02).w - expected.w).max() > 1e-9
