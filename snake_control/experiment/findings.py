@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from snake_control.experiment.facts import END_S, RUN_IN_S, SINGULAR_SHARE, WINDOW_S, Facts
+from snake_control.experiment.summary import finite
 
 _LEFT_BEHIND_M = 0.010
 _TRACKED_M, _TRACKED_RAD = 0.005, 0.02
@@ -41,7 +42,7 @@ class Finding:
         paper: what the paper states, with its figure or section.
         found: what came out, in words with numbers.
         verdict: how the two compare.
-        numbers: the figures behind the verdict, units in their names; finite or ``None``.
+        numbers: the figures behind the verdict, units in their names.
         why: for what differs, what is known about the reason.
     """
 
@@ -70,19 +71,26 @@ def as_json(found: Iterable[Finding]) -> list[dict[str, Any]]:
             "paper": finding.paper,
             "found": finding.found,
             "verdict": finding.verdict.value,
-            "numbers": dict(finding.numbers),
+            "numbers": finite(finding.numbers),
             "why": finding.why,
         }
         for finding in found
     ]
 
 
-_Judged = tuple[bool, str, dict[str, Any], str]
+# Whether the statement holds, what came out, its numbers, and why if it does not; or only why this
+# robot cannot show it.
+_Judged = tuple[bool, str, dict[str, Any], str] | str
+_NO_HEAD = "This robot has no raised head part."
 _STATEMENTS: list[Callable[[Mapping[int, Facts]], Finding]] = []
 
 
 def _statement(
-    cases: tuple[int, ...], paper: str, window: bool = False
+    cases: tuple[int, ...],
+    paper: str,
+    window: bool = False,
+    refuted_after_s: float = 0.0,
+    shown_after_s: float = 0.0,
 ) -> Callable[[Callable[..., _Judged]], Callable[..., _Judged]]:
     """Register a judge of one statement.
 
@@ -90,6 +98,8 @@ def _statement(
         cases: whose facts the judge gets, in this order.
         paper: the statement.
         window: whether it needs enough of ``WINDOW_S``.
+        refuted_after_s: a run that ends before this time cannot refute it [s].
+        shown_after_s: a run that ends before this time cannot confirm it [s].
     """
 
     def register(judge: Callable[..., _Judged]) -> Callable[..., _Judged]:
@@ -97,7 +107,14 @@ def _statement(
             lacking = _lacking(runs, cases, window)
             if lacking:
                 return Finding(cases, paper, lacking, Verdict.NOT_SHOWN, {})
-            holds, found, numbers, why = judge(*(runs[case] for case in cases))
+            judged = judge(*(runs[case] for case in cases))
+            if isinstance(judged, str):
+                return Finding(cases, paper, judged, Verdict.NOT_SHOWN, {})
+            holds, found, numbers, why = judged
+            end_s = min(runs[case].end_s for case in cases)
+            if end_s < (shown_after_s if holds else refuted_after_s):
+                found = f"{found} The run ended at {end_s:.1f} s."
+                return Finding(cases, paper, found, Verdict.NOT_SHOWN, numbers)
             verdict = Verdict.AS_IN_PAPER if holds else Verdict.DIFFERS
             return Finding(cases, paper, found, verdict, numbers, "" if holds else why)
 
@@ -121,7 +138,11 @@ def _lacking(runs: Mapping[int, Facts], cases: tuple[int, ...], window: bool) ->
     return ""
 
 
-@_statement((1,), "V_b1 became zero: the robot turned singular before it fell at 24.8 s (Fig. 14).")
+@_statement(
+    (1,),
+    "V_b1 became zero: the robot turned singular before it fell at 24.8 s (Fig. 14).",
+    refuted_after_s=31.0,
+)
 def _turns_singular(facts: Facts) -> _Judged:
     at = facts.singular_at_s
     share = facts.least_V_b1_share
@@ -137,7 +158,7 @@ def _turns_singular(facts: Facts) -> _Judged:
     return at is not None, found, numbers, "The run ended before, or the SCPs were not still."
 
 
-@_statement((1,), "x_h therefore left its target (Fig. 8).")
+@_statement((1,), "x_h therefore left its target (Fig. 8).", refuted_after_s=31.0)
 def _left_behind(facts: Facts) -> _Judged:
     error = float(facts.off_law[0])
     found = (
@@ -153,7 +174,7 @@ def _left_behind(facts: Facts) -> _Judged:
     return error >= _LEFT_BEHIND_M, found, {"x_h_error_max_m": error}, why
 
 
-def _fall(facts: Facts, case: int) -> _Judged:
+def _fall(facts: Facts, case: int) -> tuple[bool, str, dict[str, Any], str]:
     at = facts.fell_at_s
     least = int(np.nanargmin(facts.d_min))
     margin, margin_at = float(facts.d_min[least]), float(facts.t[least])
@@ -167,12 +188,16 @@ def _fall(facts: Facts, case: int) -> _Judged:
     return at is not None, found, numbers, why
 
 
-@_statement((1,), "The robot fell at 24.8 s (Fig. 14).")
+@_statement((1,), "The robot fell at 24.8 s (Fig. 14).", refuted_after_s=24.8)
 def _case_1_falls(facts: Facts) -> _Judged:
     return _fall(facts, 1)
 
 
-@_statement((2,), "V_b1 did not go to zero: the robot avoided the singularity (Fig. 14).")
+@_statement(
+    (2,),
+    "V_b1 did not go to zero: the robot avoided the singularity (Fig. 14).",
+    shown_after_s=45.0,
+)
 def _avoids_singularity(facts: Facts) -> _Judged:
     share = facts.least_V_b1_share
     found = f"V_b1 stayed above {share:.2g} of its start (smallest {np.nanmin(facts.V_b1):.1e})."
@@ -184,6 +209,8 @@ def _avoids_singularity(facts: Facts) -> _Judged:
 )
 def _scps_oscillate(still: Facts, facts: Facts) -> _Judged:
     joints = facts.run.config.robot.base_scp_joints
+    if not joints:
+        return "This robot has no B-SCP."
     numbers: dict[str, Any] = {}
     found, moving = [], []
     for joint in joints:
@@ -198,12 +225,11 @@ def _scps_oscillate(still: Facts, facts: Facts) -> _Judged:
         }
         period = "no period" if o.period_s is None else f"period {o.period_s:.1f} s"
         found.append(f"phi_{joint} {o.peak_to_peak:.2f} rad peak to peak, {period}")
-    rest = max((still.oscillation_of(joint).peak_to_peak for joint in joints), default=0.0)
+    rest = max(still.oscillation_of(joint).peak_to_peak for joint in joints)
     numbers["largest_in_case_1_rad"] = rest
-    text = "; ".join(found) or "The robot has no B-SCP"
     return (
-        bool(moving) and all(moving),
-        f"{text}. In Case 1 the same joints moved by {rest:.2g} rad.",
+        all(moving),
+        f"{'; '.join(found)}. In Case 1 the same joints moved by {rest:.2g} rad.",
         numbers,
         "The sub-tasks found a posture to rest in, or move without a period.",
     )
@@ -245,6 +271,8 @@ def _case_2_tracks(facts: Facts) -> _Judged:
 
 @_statement((2,), "V_h increased, the sub-task of the H-SCP (Fig. 13).", window=True)
 def _case_2_V_h(facts: Facts) -> _Judged:
+    if facts.run.config.robot.planar:
+        return _NO_HEAD
     growth = facts.V_h_growth
     found = (
         f"From {facts.V_h[0]:.2e} to {growth:.2f} times that (median; largest "
@@ -253,12 +281,16 @@ def _case_2_V_h(facts: Facts) -> _Judged:
     return growth > 1.0, found, {"V_h_over_start": growth}, ""
 
 
-@_statement((2,), "V_b2 = d_min went down to almost zero and the robot fell at 45.7 s (Fig. 14).")
+@_statement(
+    (2,),
+    "V_b2 = d_min went down to almost zero and the robot fell at 45.7 s (Fig. 14).",
+    refuted_after_s=45.7,
+)
 def _case_2_falls(facts: Facts) -> _Judged:
     return _fall(facts, 2)
 
 
-@_statement((3,), "The robot did not fall (Fig. 14).")
+@_statement((3,), "The robot did not fall (Fig. 14).", shown_after_s=45.0)
 def _case_3_stands(facts: Facts) -> _Judged:
     fell, found, numbers, _ = _fall(facts, 1)
     return not fell, found, numbers, "P_G left the support polygon."
@@ -283,6 +315,8 @@ def _case_3_margin(two: Facts, three: Facts) -> _Judged:
 
 @_statement((3,), "V_h and V_b1 increased (Figs. 13, 14).", window=True)
 def _case_3_costs(facts: Facts) -> _Judged:
+    if facts.run.config.robot.planar:
+        return _NO_HEAD
     V_b1 = facts.V_b1_median / float(facts.V_b1[0])
     found = f"V_h to {facts.V_h_growth:.2f} and V_b1 to {V_b1:.2f} times its start (medians)."
     numbers = {"V_h_over_start": facts.V_h_growth, "V_b1_over_start": V_b1}
@@ -338,6 +372,8 @@ def _other_motion(two: Facts, three: Facts) -> _Judged:
 @_statement((2, 3), "The motion of the B-SCPs does not affect the head part (Sections 2, 6).")
 def _head_unaffected(two: Facts, three: Facts) -> _Judged:
     n_h = two.run.config.robot.head_links
+    if n_h == 0:
+        return _NO_HEAD
     steps = min(len(two.t), len(three.t))
     heads = two.phi[:steps, :n_h], three.phi[:steps, :n_h]
     most = float(np.abs(heads[0] - heads[1]).max(initial=0.0))

@@ -8,6 +8,8 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from snake_control.config import Config
 from snake_control.control.scp_controller import ControlResult, ScpController
 from snake_control.control.torque_controller import TorqueController, TorqueResult
@@ -28,6 +30,8 @@ TORQUE_RATE_HZ = 200.0
 """Default of torque control: at 50 Hz held torques add errors of their own (docs/experiment.md)."""
 AFTER_FALL_S = 2.0
 """A run goes on for this long after the robot fell, so that figures show the fall."""
+RUNAWAY_RAD_S = 1e4
+"""Joint velocities above this mean nothing any more; without limits they grow for ever."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -110,6 +114,10 @@ def run_case(
             series.append(step)
             if not on_step(step):
                 ended, interrupted = f"interrupted at {step.t_s:.2f} s", True
+                break
+            fastest = float(np.abs(step.u).max())
+            if fastest > RUNAWAY_RAD_S:
+                ended = f"the motion ran away at {step.t_s:.2f} s: {fastest:.0e} rad/s"
                 break
             if step.fallen and fell_at_s is None:
                 fell_at_s = step.t_s

@@ -95,7 +95,7 @@ def summarise(series: Series, run: Run) -> dict[str, Any]:
         "parameters": dict(run.parameters),
         "software": software_versions(),
     }
-    return {name: _finite(value) for name, value in summary.items()}
+    return {name: finite(value) for name, value in summary.items()}
 
 
 def write_summary(summary: Mapping[str, Any], path: str | Path) -> None:
@@ -315,12 +315,12 @@ def _percentile(values: Array, percent: float) -> float | None:
     return float(np.percentile(known, percent)) if len(known) else None
 
 
-def _finite(value: Any) -> Any:
+def finite(value: Any) -> Any:
     """Replace what JSON has no number for (NaN, infinity) by null."""
     if isinstance(value, Mapping):
-        return {key: _finite(item) for key, item in value.items()}
+        return {key: finite(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_finite(item) for item in value]
+        return [finite(item) for item in value]
     if isinstance(value, float | np.floating):
         return float(value) if math.isfinite(value) else None
     return value

@@ -125,6 +125,20 @@ def test_a_short_run_shows_no_wave():
     assert "25 to 60 s" in of(found, "grows towards the tail").found
 
 
+def test_a_run_that_ends_too_soon_refutes_nothing():
+    found = findings({case: made_up(case, lambda t: {}, until_s=10.0) for case in CASES})
+    verdicts = {finding.paper: finding.verdict for finding in found}
+    # But for the head part: what is compared there are the steps that there are.
+    verdicts.pop(of(found, "does not affect the head").paper)
+    assert set(verdicts.values()) == {Verdict.NOT_SHOWN}
+    assert "The run ended at 10.0 s" in of(found, "The robot fell at 24.8 s").found
+
+
+def test_a_fall_refutes_case_3_however_short_the_run():
+    found = findings({3: made_up(3, lambda t: {"fallen": t >= 8.0}, until_s=10.0)})
+    assert of(found, "The robot did not fall").verdict is Verdict.DIFFERS
+
+
 def test_a_robot_that_rests_in_case_2_differs():
     found = findings({case: made_up(case, lambda t: {}) for case in CASES})
     assert of(found, "vibrated periodically").verdict is Verdict.DIFFERS
