@@ -30,7 +30,9 @@ from snake_control.experiment.summary import software_versions
 _TEMPLATE = "report.html.j2"
 _DPI = 110
 _UNKNOWN = "-"
-_SYMBOL = re.compile(r"\b(phi|eta|V|N|P|A|B|d|w|x|y|z)_([A-Za-z]?[A-Za-z0-9]{0,3})\b")
+_SYMBOL = re.compile(r"\b(phi|eta|V|N|P|d|w|x|y|z)_([A-Za-z]?[A-Za-z0-9]{0,3})\b")
+_POWER = re.compile(r"(\d)e([+-]\d+)")
+_PLURAL = {Verdict.DIFFERS: "differ"}
 _GREEK = {"phi": "&phi;", "eta": "&eta;"}
 
 
@@ -80,7 +82,7 @@ def write_report(
         runs=[
             (CASE_NAMES[case], facts.run.summary["ended"]) for case, facts in sorted(runs.items())
         ],
-        counts=[(v.value, sum(f.verdict is v for f in found)) for v in Verdict],
+        counts=[(_PLURAL.get(v, v.value), sum(f.verdict is v for f in found)) for v in Verdict],
         findings=found,
         css_class={Verdict.AS_IN_PAPER: "same", Verdict.DIFFERS: "differs"},
         window=WINDOW_S,
@@ -96,13 +98,20 @@ def write_report(
 
 
 def symbols(text: str) -> str:
-    """Return ``text`` as HTML with the paper's symbols set as such: phi_7, V_b1, d_min, x_h."""
-    return _SYMBOL.sub(_set_symbol, html.escape(text))
+    """Return ``text`` as HTML with the paper's symbols set as such: phi_7, V_b1, d_min, x_h.
+
+    Powers of ten, too: 2.5e+08.
+    """
+    return _POWER.sub(_set_power, _SYMBOL.sub(_set_symbol, html.escape(text)))
 
 
 def _set_symbol(match: re.Match[str]) -> str:
     name = _GREEK.get(match[1], match[1])
     return f"<i>{name}</i><sub>{match[2]}</sub>"
+
+
+def _set_power(match: re.Match[str]) -> str:
+    return f"{match[1]}&middot;10<sup>{int(match[2])}</sup>"
 
 
 def figures_of_merit(runs: Sequence[Facts]) -> list[Row]:

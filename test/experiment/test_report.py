@@ -67,7 +67,7 @@ def test_nothing_is_fetched_and_no_script_runs(page):
 def test_verdicts_and_numbers_of_all_cases_are_there(page):
     text = re.sub(r"\s+", " ", "".join(page.words))
     assert text.count("as in the paper") == 1 + 13
-    assert text.count("differs") >= 1 + 4
+    assert text.count("differs") >= 4
     for words in ("Case 1: SCPs still", "lowest tenth 25..60 s", "perfect servos", "head block"):
         assert (words in text) == (words != "head block")
     assert "This is not the paper's robot" not in text
@@ -76,6 +76,8 @@ def test_verdicts_and_numbers_of_all_cases_are_there(page):
 def test_symbols_are_set_and_everything_else_escaped():
     assert symbols("phi_7 < V_b1") == "<i>&phi;</i><sub>7</sub> &lt; <i>V</i><sub>b1</sub>"
     assert symbols("d_min, x_h") == "<i>d</i><sub>min</sub>, <i>x</i><sub>h</sub>"
+    assert symbols("2.5e+08 and 1e-3") == "2.5&middot;10<sup>8</sup> and 1&middot;10<sup>-3</sup>"
+    assert symbols("A_hat loses rank") == "A_hat loses rank"
     assert symbols("<script>") == "&lt;script&gt;"
 
 
