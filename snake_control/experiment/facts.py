@@ -81,6 +81,16 @@ class Facts:
         """Smallest V_b1 as a share of its start."""
         return float(np.nanmin(self.V_b1) / self.V_b1[0])
 
+    @property
+    def nearness(self) -> str:
+        """Largest nearness of a singular shape of Fig. 5, in words."""
+        summary = self.run.summary
+        value = summary["max_singular_nearness"]
+        if value is None:
+            return "an unknown value"
+        when = f"at {summary['max_singular_nearness_at_s']:.1f} s"
+        return f"{value:.3f} ({summary['max_singular_nearness_shape']}, {when})"
+
     def V_b1_at(self, t_s: float) -> float:
         """Return V_b1 at the step nearest to ``t_s``."""
         return float(self.V_b1[np.abs(self.t - t_s).argmin()])

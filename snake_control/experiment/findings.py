@@ -152,9 +152,13 @@ def _turns_singular(facts: Facts) -> _Judged:
     fell = "never fell" if at is None else f"fell at {at:.1f} s"
     found = (
         f"V_b1 {fell} below {SINGULAR_SHARE:.0%} of its start and came down to {share:.2g} of it: "
-        f"{course}."
+        f"{course}. The nearness of a singular shape (0 to 1, Fig. 5) rose to {facts.nearness}."
     )
-    numbers = {"below_2_percent_at_s": at, "min_V_b1_over_start": share}
+    numbers = {
+        "below_2_percent_at_s": at,
+        "min_V_b1_over_start": share,
+        "max_singular_nearness": facts.run.summary["max_singular_nearness"],
+    }
     return at is not None, found, numbers, "The run ended before, or the SCPs were not still."
 
 
@@ -200,7 +204,10 @@ def _case_1_falls(facts: Facts) -> _Judged:
 )
 def _avoids_singularity(facts: Facts) -> _Judged:
     share = facts.least_V_b1_share
-    found = f"V_b1 stayed above {share:.2g} of its start (smallest {np.nanmin(facts.V_b1):.1e})."
+    found = (
+        f"V_b1 stayed above {share:.2g} of its start (smallest {np.nanmin(facts.V_b1):.1e}); the "
+        f"nearness of a singular shape rose to {facts.nearness}."
+    )
     return facts.singular_at_s is None, found, {"min_V_b1_over_start": share}, ""
 
 

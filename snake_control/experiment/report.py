@@ -132,6 +132,7 @@ def figures_of_merit(runs: Sequence[Facts]) -> list[Row]:
         row("V_b1, smallest", lambda f: f"{np.nanmin(f.V_b1):.2g}"),
         row(f"V_b1, median {window}", lambda f: f"{f.V_b1_median:.2g}", True),
         row(f"V_b1 below {SINGULAR_SHARE:.0%} of its start", _singular_text),
+        row("nearness of a singular shape, largest", lambda f: f.nearness),
         row(f"V_h, median {window} over start", lambda f: f"{f.V_h_growth:.2f}", True),
     ]
     rows += [
@@ -193,7 +194,7 @@ def _pictures(runs: Mapping[int, Facts]) -> list[Picture]:
     series = {case: facts.run.series for case, facts in runs.items()}
     drawn: list[tuple[str, Callable[[], Figure]]] = [
         (
-            "V_b1 and d_min (Fig. 14): distance from singularity and from falling.",
+            "V_b1 and d_min (Fig. 14), and how near a singular shape of Fig. 5 is (0 to 1).",
             lambda: comparison.base_costs(series),
         ),
         ("SCPs and V_h (Fig. 13).", lambda: comparison.scps(series)),

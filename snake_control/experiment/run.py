@@ -19,6 +19,9 @@ from snake_control.experiment.parameters import configuration_parameters
 from snake_control.experiment.series import Series, Step
 from snake_control.experiment.servos import LimitedServos, PerfectServos, Servos
 from snake_control.experiment.summary import Run, summarise
+from snake_control.model.geometry import planar_base
+from snake_control.model.singular_shape import singular_shape
+from snake_control.model.structure import Structure, structure
 from snake_control.plant.kinematic import KinematicPlant
 from snake_control.plant.plant import PlantState
 from snake_control.plant.torque import MAX_SUBSTEP_S, TorquePlant
@@ -159,8 +162,9 @@ def step_of(sample: LockstepSample[ControlResult]) -> Step:
     )
 
 
-def torque_step_of(sample: LockstepSample[TorqueResult]) -> Step:
+def torque_step_of(sample: LockstepSample[TorqueResult], s: Structure) -> Step:
     """Return the row of torque control: u are the joint velocities that came of the torques."""
+    shape = singular_shape(planar_base(s, sample.result.phi[s.n_h :]))
     return Step(
         **_common(sample),
         status="tracking",
@@ -171,8 +175,8 @@ def torque_step_of(sample: LockstepSample[TorqueResult]) -> Step:
         range_limited=(),
         sigma_min_B_tilde=math.nan,
         sigma_min_A_hat=math.nan,
-        singular_nearness=math.nan,
-        singular_shape="",
+        singular_nearness=shape.nearness,
+        singular_shape=shape.kind,
         effort=sample.result.u,
     )
 
@@ -205,10 +209,8 @@ def _steps(config: Config, settings: Settings) -> Iterator[Step]:
         state: PlantState = body.reset(start)
         goal = configured_trajectory(config.trajectory_generator, state.w)
         law = TorqueController(robot, config.controller)
-        yield from map(
-            torque_step_of,
-            lockstep(body, state, law, goal.sample, settings.duration_s, period_s),
-        )
+        for sample in lockstep(body, state, law, goal.sample, settings.duration_s, period_s):
+            yield torque_step_of(sample, structure(robot))
         return
     plant = KinematicPlant(robot, settings.plant_step_s)
     state = plant.reset(start)
