@@ -172,8 +172,8 @@ def _left_behind(facts: Facts) -> _Judged:
     why = (
         "In a singular posture the wheels no longer tell how far the robot rolls (A_hat loses "
         "rank), so that the smallest slip carries the head off. Here the wheels slip by "
-        f"{1e3 * facts.largest_slip:.2g} mm/s at most, and no joint stops the motion: the largest "
-        f"angle is {facts.largest_angle:.2f} rad, where an AX-12 ends at 2.62."
+        f"{1e3 * facts.largest_slip:.2g} mm/s at most; the largest joint "
+        f"angle is {facts.largest_angle:.2f} rad (an AX-12 ends at 2.62)."
     )
     return error >= _LEFT_BEHIND_M, found, {"x_h_error_max_m": error}, why
 
