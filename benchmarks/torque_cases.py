@@ -24,6 +24,7 @@ from snake_control.config import ControllerConfig, RobotConfig
 from snake_control.control.reference import Reference
 from snake_control.control.torque_controller import TorqueController, TorqueResult
 from snake_control.experiment import style
+from snake_control.model.posture import Posture
 from snake_control.plant.torque import TorquePlant, TorquePlantState
 from snake_control.trajectory.approach import Approach
 from snake_control.trajectory.line import Line
@@ -120,9 +121,17 @@ def figures(samples: list[tuple[float, TorquePlantState, TorqueResult]]) -> dict
         "V_b1_min": float(V_b1.min()),
         "V_b1_below_1_percent_at_s": float(below[0]) if len(below) else None,
         "sigma_min_E_tilde_min": min(r.sigma_min_E_tilde for r in results),
+        "push_at_start_n_m": _push(results[0]),
+        "push_at_end_n_m": _push(results[-1]),
         "d_min_min_m": min(s.d_min for s in states),
         "fell_at_s": fell[0] if fell else None,
     }
+
+
+def _push(result: TorqueResult) -> float:
+    """Return the largest torque that 1 m/s^2 of the head in y takes by itself [N m]."""
+    posture = Posture(RobotConfig(), np.concatenate((result.w, result.phi)))
+    return float(np.abs(np.linalg.pinv(posture.k.E_tilde) @ result.M_tilde[:, 1]).max())
 
 
 def plot(runs: dict[int, list[tuple[float, TorquePlantState, TorqueResult]]]) -> Figure:
@@ -161,15 +170,14 @@ def main() -> int:
             samples = simulate(run, arguments.duration)
             found[run.title] = figures(samples)
             found[run.title]["computed_in_s"] = time.perf_counter() - start
+            print(run.title, flush=True)
+            for name, value in found[run.title].items():
+                print(f"  {name:32}{value if value is None else format(value, '.4g')}")
             if hold_s == 1e-3 and not approach_s:
                 drawn[case] = samples
     with context(style.RC):
         plot(drawn).savefig(arguments.out / "torque.png", dpi=100)
     (arguments.out / "torque_cases.json").write_text(json.dumps(found, indent=2) + "\n")
-    for title, numbers in found.items():
-        print(title)
-        for name, value in numbers.items():
-            print(f"  {name:32}{value if value is None else format(value, '.4g')}")
     print(f"written to {arguments.out}")
     return 0
 
