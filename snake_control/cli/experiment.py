@@ -82,7 +82,7 @@ def _cases(arguments: ExperimentArguments, configurations: Sequence[Config], sto
             break
     runs = [run for run in runs if len(run.series)]
     if runs:
-        _report(runs, arguments.out)
+        _judge(runs, arguments)
 
 
 def _one_case(arguments: ExperimentArguments, config: Config, stop: _Stop) -> CaseRun:
@@ -120,17 +120,20 @@ def _one_case(arguments: ExperimentArguments, config: Config, stop: _Stop) -> Ca
     return run
 
 
-def _report(runs: Sequence[CaseRun], out: Path) -> None:
+def _judge(runs: Sequence[CaseRun], arguments: ExperimentArguments) -> None:
     from snake_control.experiment.facts import Facts
     from snake_control.experiment.findings import as_json, findings
-    from snake_control.experiment.internal_motion import internal_motions
-    from snake_control.experiment.report import write_report
 
+    out = arguments.out
     facts = {run.case: Facts(run) for run in runs}
     found = findings(facts)
     text = json.dumps(as_json(found), indent=2, allow_nan=False)
     (out / "findings.json").write_text(text + "\n", encoding="utf-8")
-    write_report(facts, found, internal_motions(runs[0].config.robot), out / "report.html")
+    if arguments.report:
+        from snake_control.experiment.internal_motion import internal_motions
+        from snake_control.experiment.report import write_report
+
+        write_report(facts, found, internal_motions(runs[0].config.robot), out / "report.html")
     if len(runs) > 1:
         print()
         for finding in found:
@@ -138,7 +141,8 @@ def _report(runs: Sequence[CaseRun], out: Path) -> None:
             print(f"{finding.verdict.value:16}case {cases}: {finding.paper}")
     print()
     print(out / "findings.json")
-    print(out / "report.html")
+    if arguments.report:
+        print(out / "report.html")
 
 
 def _internal_motion(config: Config, out: Path) -> None:

@@ -31,6 +31,7 @@ class ExperimentArguments:
         controller: ``velocity`` or ``torque``.
         internal_motion: only draw the internal motion.
         figures: whether to draw the figures of each case.
+        report: whether to write the report.
     """
 
     cases: tuple[int, ...]
@@ -44,6 +45,7 @@ class ExperimentArguments:
     controller: str
     internal_motion: bool
     figures: bool
+    report: bool
 
     def configurations(self) -> list[Config]:
         """Return the configuration of each case, in rising order of cases.
@@ -157,6 +159,9 @@ def parse_arguments(argv: Sequence[str] | None = None) -> ExperimentArguments:
         "--no-figures", dest="figures", action="store_false", help="no figures for each case"
     )
     parser.add_argument(
+        "--no-report", dest="report", action="store_false", help="findings.json, no report.html"
+    )
+    parser.add_argument(
         "--internal-motion",
         action="store_true",
         help="run no case; draw how the body moves while the head stands still",
@@ -176,6 +181,7 @@ def parse_arguments(argv: Sequence[str] | None = None) -> ExperimentArguments:
         controller=given.controller,
         internal_motion=given.internal_motion,
         figures=given.figures,
+        report=given.report,
     )
 
 
