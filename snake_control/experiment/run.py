@@ -53,7 +53,7 @@ class Settings:
 
     duration_s: float = 60.0
     rate_hz: float = 50.0
-    plant_step_s: float = 0.005
+    plant_step_s: float = 0.01
     servos: str = "perfect"
     carry_remainder: bool = True
     controller: str = "velocity"

@@ -54,6 +54,7 @@ def plant_state(t_s: float, x: float, **changes) -> PlantState:
         "w": [x, 0.0, 0.2, 0.0, 0.0, 0.0],
         "name": NAMES,
         "phi": [10.0 * x] * 11,
+        "effort": [0.1] * 11,
         "wheeled_link": list(ROBOT.wheeled_links),
         "slip": [0.001] * 4,
         "d_min": 0.03,
@@ -139,6 +140,7 @@ def test_ground_truth_is_that_of_the_control_steps_moment(wired):
     assert series.numbers("w_measured")[0] == pytest.approx([0.1] * 6)
     assert series.numbers("fallen")[0] == 0.0  # the nearest truth came before the fall
     assert series.numbers("d_min_true")[0] == pytest.approx(0.03)
+    assert series.numbers("effort")[0] == pytest.approx([0.1] * 11)
 
 
 def test_step_without_ground_truth_is_kept(wired):
