@@ -131,6 +131,11 @@ class RobotConfig:
         self._set_per_joint("start_joint_angles_rad")
         self._check_limits()
 
+    def __hash__(self) -> int:
+        # Looked up in every control step, so of a few fields that tell robots apart; equal robots
+        # have equal ones.
+        return hash((self.links, self.head_links, self.wheelless_links, self.head_scp_joints))
+
     def _set_per_joint(self, name: str) -> None:
         values = per_joint(f"robot.{name}", getattr(self, name), self.joints)
         object.__setattr__(self, name, values)

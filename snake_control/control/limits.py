@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import dataclasses
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +16,7 @@ Array = NDArray[np.float64]
 RANGE_MARGIN_RAD = 0.0307
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class Limited:
+class Limited(NamedTuple):
     """A velocity vector within limits, and what had to be done to it.
 
     Attributes:
@@ -39,7 +38,8 @@ class JointLimits:
     def __init__(self, robot: RobotConfig) -> None:
         self._speed = np.array(robot.joint_speed_limits_rad_s)
         bounds = np.array(robot.joint_limits_rad).reshape(-1, 2)
-        self._lower, self._upper = bounds[:, 0], bounds[:, 1]
+        self._lower = bounds[:, 0] + RANGE_MARGIN_RAD
+        self._upper = bounds[:, 1] - RANGE_MARGIN_RAD
 
     def apply(self, phi: Array, u: Array) -> Limited:
         """Limit joint velocities.
@@ -52,19 +52,19 @@ class JointLimits:
             phi: joint angles, (n-1,) [rad].
             u: wanted joint velocities, finite, (n-1,) [rad/s].
         """
-        outward = ((phi >= self._upper - RANGE_MARGIN_RAD) & (u > 0)) | (
-            (phi <= self._lower + RANGE_MARGIN_RAD) & (u < 0)
-        )
-        u = np.where(outward, 0.0, u)
+        range_limited: tuple[int, ...] = ()
+        # The largest of a list is quicker than numpy's of a few numbers.
+        if max(np.maximum(phi - self._upper, self._lower - phi).tolist()) >= 0.0:
+            outward = ((phi >= self._upper) & (u > 0)) | ((phi <= self._lower) & (u < 0))
+            range_limited = _joints(outward)
+            u = np.where(outward, 0.0, u)
         excess = np.abs(u) / self._speed
-        worst = float(excess.max())
-        scale = 1.0 if worst <= 1.0 else 1.0 / worst
-        limiting = np.flatnonzero(excess > 1.0) if scale < 1.0 else np.array([], dtype=int)
+        worst = max(excess.tolist())
+        if worst <= 1.0:
+            return Limited(u, 1.0, (), range_limited)
         # Only the joint that is furthest beyond its limit determines the scale.
-        limiting = limiting[excess[limiting] >= worst]
-        return Limited(
-            u=u * scale,
-            speed_scale=scale,
-            speed_limited=tuple(int(j) + 1 for j in limiting),
-            range_limited=tuple(int(j) + 1 for j in np.flatnonzero(outward)),
-        )
+        return Limited(u / worst, 1.0 / worst, _joints(excess >= worst), range_limited)
+
+
+def _joints(chosen: NDArray[np.bool_]) -> tuple[int, ...]:
+    return tuple((chosen.nonzero()[0] + 1).tolist())

@@ -127,7 +127,7 @@ class TorqueController:
 
         Raises:
             ModelError: an argument has the wrong shape or is not finite.
-            SingularError: B_tilde has no inverse, or the answer is not finite.
+            SingularError: the answer is not finite.
         """
         del t
         s = self._s

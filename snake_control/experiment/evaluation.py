@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snake_control.config import Config, RobotConfig
-from snake_control.control.scp_controller import ControlResult, ScpController
-from snake_control.errors import ConfigError, SingularError
+from snake_control.control.scp_controller import ScpController
+from snake_control.errors import ConfigError
 from snake_control.experiment.cases import CASES
 from snake_control.model.dynamics import Dynamics
 from snake_control.model.posture import Posture
@@ -52,8 +52,9 @@ def read_states(document: object, robot: RobotConfig) -> tuple[list[State], bool
 def evaluate(config: Config, state: State) -> dict[str, Any]:
     """Return every model quantity at a state, ready for JSON.
 
-    Rows and signs: docs/equations.md. What does not exist there (a singular posture has no
-    ``F_bar``) or is not finite is ``None``.
+    Rows and signs: docs/equations.md. What does not exist there (a singular head posture has no
+    ``F_bar``: ``damping`` is above 0 then) or is not finite is ``None``. The control law has an
+    answer everywhere.
 
     Args:
         config: robot, controller (with the state's case, if it has one) and trajectory.
@@ -62,21 +63,27 @@ def evaluate(config: Config, state: State) -> dict[str, Any]:
     posture = Posture(config.robot, state.q)
     k = posture.k
     dynamics = Dynamics(config.robot)
-    quantities: dict[str, Callable[[], object]] = {
-        "A_bar": lambda: k.A_bar,
-        "B_bar": lambda: k.B_bar,
-        "A_tilde": lambda: k.A_tilde,
-        "B_tilde": lambda: k.B_tilde,
+    everywhere: dict[str, object] = {
+        "A_bar": k.A_bar,
+        "B_bar": k.B_bar,
+        "A_tilde": k.A_tilde,
+        "B_tilde": k.B_tilde,
+        "V_h": posture.V_h,
+        "d_min": posture.support.d_min,
+        "singular_nearness": posture.singular_shape.nearness,
+        "damping": k.damping,
+    }
+    with_inverse: dict[str, Callable[[], object]] = {
         "F_bar": lambda: k.F_bar,
         "E_tilde": lambda: k.E_tilde,
-        "V_h": lambda: posture.V_h,
         "V_b1": lambda: posture.V_b1,
-        "d_min": lambda: posture.support.d_min,
-        "singular_nearness": lambda: posture.singular_shape.nearness,
         "M_tilde": lambda: dynamics.reduced(posture, state.q_dot).M_tilde,
         "h_tilde": lambda: dynamics.reduced(posture, state.q_dot).h_tilde,
     }
-    found = {name: _number(value) for name, value in quantities.items()}
+    found = {name: _json(value) for name, value in everywhere.items()}
+    found |= {
+        name: _json(value()) if k.damping == 0.0 else None for name, value in with_inverse.items()
+    }
     return found | _control(config, state)
 
 
@@ -85,29 +92,13 @@ def _control(config: Config, state: State) -> dict[str, Any]:
     robot = config.robot
     trajectory = configured_trajectory(config.trajectory_generator, state.q[:6])
     controller = ScpController(robot, config.controller)
-
-    def result() -> ControlResult:
-        return controller.step(state.q, state.q_dot, trajectory.sample(state.t), state.t)
-
+    decided = controller.step(state.q, state.q_dot, trajectory.sample(state.t), state.t)
     m_h = len(robot.head_scp_joints)
-    with np.errstate(all="ignore"):
-        try:
-            decided = result()
-        except SingularError:
-            return dict.fromkeys(("phi_dot_hd", "phi_dot_bd", "u"))
     return {
         "phi_dot_hd": _json(decided.phi_tilde_dot_d[:m_h]),
         "phi_dot_bd": _json(decided.phi_tilde_dot_d[m_h:]),
         "u": _json(decided.u_unlimited),
     }
-
-
-def _number(quantity: Callable[[], object]) -> Any:
-    with np.errstate(all="ignore"):
-        try:
-            return _json(quantity())
-        except SingularError:
-            return None
 
 
 def _json(value: object) -> Any:

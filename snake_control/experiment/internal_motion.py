@@ -59,9 +59,6 @@ def internal_motions(
         robot: the robot.
         phi: joint angles at phase 0, (n-1,) [rad]; by default where the experiment starts.
         phases: turns of the driving SCP, rising, 0 among them [rad].
-
-    Raises:
-        SingularError: the motion meets a posture where B_tilde has no inverse.
     """
     start = np.array(robot.start_joint_angles_rad if phi is None else phi, dtype=float)
     phases = np.asarray(phases, dtype=float)

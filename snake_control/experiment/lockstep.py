@@ -95,9 +95,6 @@ def lockstep(
 
     Yields:
         One sample for each cycle, the last one at ``duration_s``.
-
-    Raises:
-        SingularError: the controller met a posture it cannot answer.
     """
     servos = PerfectServos() if servos is None else servos
     servos.reset(state.phi)

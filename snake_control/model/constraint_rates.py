@@ -92,9 +92,6 @@ def F_bar_rate(g: Geometry, k: Kinematics, q_dot: Array) -> Array:
 
     Returns:
         Shape of F_bar, (n - m - 1, 6 + m).
-
-    Raises:
-        SingularError: B_tilde has no inverse.
     """
     S, S_bar = selection(g.s)
     G_dot = constraint_rate(g, q_dot)
@@ -106,9 +103,6 @@ def F_bar_drift(g: Geometry, k: Kinematics, q_dot: Array) -> Array:
     """Return F_bar_dot w_tilde_dot of (19) without forming F_bar_dot, (n - m - 1,) [rad/s^2].
 
     The joint accelerations that keep the constraints while w_tilde moves evenly.
-
-    Raises:
-        SingularError: B_tilde has no inverse.
     """
     S, S_bar = selection(g.s)
     velocity = np.zeros_like(q_dot)
@@ -124,7 +118,7 @@ def solve_B_tilde(k: Kinematics, right: Array) -> Array:
     gives the base joints one by one, which on long robots keeps digits that pivoting loses.
     """
     s = k.s
-    head = np.linalg.solve(k.head_block, right[s.head_rows])
+    head = k.solve_head(right[s.head_rows])
     rows = k.B_bar[s.base_rows]
     right = right[s.base_rows] - rows[:, s.theta_h] @ head
     base = solve_triangular(rows[:, s.theta_b], right, lower=True, check_finite=False)

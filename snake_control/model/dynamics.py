@@ -125,7 +125,6 @@ class Dynamics:
 
         Raises:
             ModelError: q_dot has the wrong shape or is not finite.
-            SingularError: B_tilde has no inverse.
         """
         full = self.full(posture.g.q, q_dot)
         F_bar = posture.k.F_bar
@@ -149,7 +148,6 @@ class Dynamics:
 
         Raises:
             ModelError: q_dot has the wrong shape or is not finite.
-            SingularError: B_tilde has no inverse.
         """
         q, q_dot = self._on_floor(posture.g.q, self._checked("q_dot", q_dot))
         order = self._order

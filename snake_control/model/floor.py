@@ -8,8 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from snake_control.config import RobotConfig
-from snake_control.model.geometry import Geometry, geometry, link_centers
-from snake_control.model.rotation import cross, rotation_from_rpy, rpy_from_rotation, rpy_rates
+from snake_control.model.geometry import Geometry
+from snake_control.model.head_chain import HeadChain, head_chain
+from snake_control.model.rotation import rpy_from_rotation, rpy_rates
+from snake_control.model.structure import structure
+from snake_control.model.vector import ZERO, Vector, along, cross, dot, through
 
 Array = NDArray[np.float64]
 
@@ -27,12 +30,23 @@ def head_pose_on_floor(robot: RobotConfig, phi: ArrayLike, base: ArrayLike) -> A
     Returns:
         w = [x_h, y_h, z_h, R, P, Y], (6,) [m, rad].
     """
-    x, y, yaw = np.asarray(base, dtype=float)
-    at_origin = geometry(robot, np.concatenate((np.zeros(6), np.asarray(phi, dtype=float))))
-    rotation = rotation_from_rpy((0.0, 0.0, yaw)) @ at_origin.base_rotation.T
-    from_tip = at_origin.base_origin - at_origin.head_points[0]
-    tip = np.array([x, y, robot.wheel_radius_m]) - rotation @ from_tip
-    return np.concatenate((tip, rpy_from_rotation(rotation)))
+    s = structure(robot)
+    chain = head_chain(s, np.asarray(phi, dtype=float)[: s.n_h].tolist())
+    return chain_pose_on_floor(robot, chain, np.asarray(base, dtype=float))
+
+
+def chain_pose_on_floor(robot: RobotConfig, chain: HeadChain, base: Array) -> Array:
+    """Return w as ``head_pose_on_floor`` does, of a head part that is worked out already."""
+    x, y, yaw = base.tolist()
+    c, s = math.cos(yaw), math.sin(yaw)
+
+    def turned(v: Vector) -> Vector:
+        return c * v[0] - s * v[1], s * v[0] + c * v[1], v[2]
+
+    tip = along((x, y, robot.wheel_radius_m), 1.0, turned(chain.tip))
+    forward, left, up = map(turned, chain.frame)
+    rpy = rpy_from_rotation(tuple(zip(forward, left, up, strict=True)))
+    return np.array((*tip, *rpy.tolist()))
 
 
 def base_under_head(robot: RobotConfig, phi: ArrayLike, w: ArrayLike) -> Array:
@@ -68,15 +82,17 @@ def head_velocity(g: Geometry, base_rate: ArrayLike, phi_dot: ArrayLike) -> Arra
         base_rate: rate of [x, y, yaw] of the front end of link n_h + 1, (3,) [m/s, rad/s].
         phi_dot: joint velocities, (n-1,) [rad/s].
     """
-    x_dot, y_dot, yaw_dot = np.asarray(base_rate, dtype=float)
-    # Head joint i turns all in front of it backwards.
-    turning = -g.head_axes.T * np.asarray(phi_dot, dtype=float)[: g.s.n_h]
-    angular = turning.sum(axis=1) + np.array([0.0, 0.0, yaw_dot])
-    tip = g.head_points[0]
-    linear = np.array([x_dot, y_dot, 0.0])
-    linear += cross(np.array([[0.0], [0.0], [yaw_dot]]), (tip - g.base_origin)[:, None])[:, 0]
-    linear += cross(turning, (tip - g.head_points[1:]).T).sum(axis=1)
-    return np.concatenate((linear, rpy_rates(g.q[3:6], angular)))
+    x_dot, y_dot, yaw_dot = np.asarray(base_rate, dtype=float).tolist()
+    velocities = np.asarray(phi_dot, dtype=float)[: g.s.n_h].tolist()
+    # In base coordinates. Head joint i turns all in front of it backwards.
+    linear, angular = ZERO, along(ZERO, yaw_dot, g.rows[2])
+    for velocity, (by_origin, axis) in zip(velocities, g.chain.twists, strict=True):
+        linear = along(linear, -velocity, by_origin)
+        angular = along(angular, -velocity, axis)
+    linear = along(linear, 1.0, cross(angular, g.chain.tip))
+    x, y, z = through(g.rows, linear)
+    rates = rpy_rates(g.q[3:6], through(g.rows, angular))
+    return np.array((x + x_dot, y + y_dot, z, *rates.tolist()))
 
 
 def base_pose(g: Geometry) -> Array:
@@ -92,12 +108,13 @@ def gravity_efforts(g: Geometry) -> Array:
     head joints carry the links in front of them; base joints turn about the vertical and carry
     nothing.
     """
-    n_h = g.s.n_h
-    masses = g.s.masses[:n_h]
-    in_front = np.cumsum(masses)
-    moment = np.cumsum(masses[:, None] * link_centers(g)[:n_h], axis=0)
-    arms = moment - in_front[:, None] * g.head_points[1:]
-    axes = g.head_axes
+    chain, up = g.chain, g.rows[2]
+    in_front, moment = 0.0, ZERO
     efforts = np.zeros(g.s.n - 1)
-    efforts[:n_h] = -GRAVITY_M_S2 * (axes[:, 0] * arms[:, 1] - axes[:, 1] * arms[:, 0])
+    for joint, ((_, axis), pivot) in enumerate(zip(chain.twists, chain.pivots, strict=True)):
+        mass = g.s.robot.link_mass_kg[joint]
+        in_front += mass
+        moment = along(moment, mass, chain.centers[joint])
+        arm = along(moment, -in_front, pivot)
+        efforts[joint] = -GRAVITY_M_S2 * dot(up, cross(axis, arm))
     return efforts

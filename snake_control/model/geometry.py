@@ -1,8 +1,9 @@
 """Where every link, joint and wheel of the robot is, for one posture q.
 
-The head part is a spatial chain. All joints of the base part turn about the same axis
-(Assumption 2), so the base part is planar in the frame of its first link, ``base``, level or not.
-Its origin is the front end of link n_h + 1, where joint n_h turns.
+All joints of the base part turn about the same axis (Assumption 2), so it is planar in the frame
+of its first link, ``base``, level or not. Its origin is the front end of link n_h + 1, where joint
+n_h turns. The head part is a spatial chain in the same frame. So only the three rows of
+``base_rows`` know how the robot lies in the world; everything else follows from joint angles.
 
 A planar snake is a base part alone, its frame that of link 1. It lies on the floor, so z, R and P
 in its q stand for nothing and are not read.
@@ -10,59 +11,138 @@ in its q stand for nothing and are not read.
 
 from __future__ import annotations
 
-import dataclasses
+import math
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from snake_control.config import RobotConfig
 from snake_control.errors import ModelError
-from snake_control.model.rotation import cross, rotation_from_rpy, rpy_rate_map
+from snake_control.model.head_chain import HeadChain, base_rows, head_chain
+from snake_control.model.lazy import lazy
 from snake_control.model.structure import Structure, structure
+from snake_control.model.vector import ZERO, Rows, Vector, cross, dot
 
 Array = NDArray[np.float64]
+Plane = NDArray[np.complex128]
+"""Vectors or points of the base plane: x + i y in base coordinates."""
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
 class PlanarBase:
     """The base part in the frame of its first link; depends on the base joints alone.
 
     Attributes:
         s: index sets of the robot.
-        x, y: directions of each base link, forward and left, in base coordinates, (n_b, 2).
-        centers: link centres of the base part in base coordinates, (n_b, 2).
-        hitches: where base joints n_h+1 .. n-1 turn, in base coordinates, (n_b - 1, 2).
+        forward: direction of each base link, (n_b,), in the plane x + i y as the next three.
+        links: vector from rear to front end of each base link, (n_b,) [m].
+        fronts: front end of each base link; but for the first, where its joint turns, (n_b,) [m].
+        middles: centre of each base link, (n_b,) [m].
     """
 
-    s: Structure
-    x: Array
-    y: Array
-    centers: Array
-    hitches: Array
+    def __init__(self, s: Structure, base_angles: Array) -> None:
+        """Work out the base part for the angles of joints n_h+1 .. n-1, (n_b - 1,) [rad]."""
+        half = s.robot.half_length_m
+        heading = np.zeros(s.n_b)
+        np.add.accumulate(base_angles, out=heading[1:])
+        self.s = s
+        self.forward = np.exp(1j * heading)
+        self.links = self.forward * (2 * half)
+        self.fronts = self.links - np.add.accumulate(self.links)
+        self.middles = self.fronts - self.links * 0.5
+
+    @property
+    def x(self) -> Array:
+        """Forward direction of each base link in base coordinates, (n_b, 2)."""
+        return in_plane(self.forward)
+
+    @property
+    def y(self) -> Array:
+        """Left direction of each base link in base coordinates, (n_b, 2)."""
+        return in_plane(1j * self.forward)
+
+    @property
+    def centers(self) -> Array:
+        """Link centres of the base part in base coordinates, (n_b, 2) [m]."""
+        return in_plane(self.middles)
+
+    @property
+    def hitches(self) -> Array:
+        """Where base joints n_h+1 .. n-1 turn, in base coordinates, (n_b - 1, 2) [m]."""
+        return in_plane(self.fronts[1:])
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
 class Geometry(PlanarBase):
     """A posture, worked out once and read by every model quantity.
 
     Attributes:
         q: [w, phi], (n+5,).
-        base_rotation: columns are the axes of the base frame in the world, (3, 3).
-        base_origin: front end of link n_h + 1 in the world, (3,).
-        head_points: front ends of links 1 .. n_h+1 in the world, (n_h+1, 3).
-        head_centers: centres of links 1 .. n_h in the world, (n_h, 3).
-        head_axes: axis of each head joint in the world, (n_h, 3).
-        twists: how the base frame moves for each of [w, phi_1 .. phi_(n_h)]: linear velocity at its
-            origin and angular velocity, in base coordinates, (6, 6 + n_h).
+        chain: the head part in base coordinates.
+        rows: rotation matrix of the base frame in the world by rows; row 2 is "up".
+        attitude_axes: axes about which R, P and Y turn the robot, in base coordinates; 0 for R and
+            P of a planar snake.
+        pitch: P [rad]; 0 of a planar snake.
     """
 
-    q: Array
-    base_rotation: Array
-    base_origin: Array
-    head_points: Array
-    head_centers: Array
-    head_axes: Array
-    twists: Array
+    def __init__(self, s: Structure, q: Array, chain: HeadChain) -> None:
+        """Work out the base part; ``chain`` belongs to the head joints of q."""
+        super().__init__(s, q[6 + s.n_h :])
+        _, _, _, roll, self.pitch, yaw = q[:6].tolist()
+        if s.robot.planar:
+            roll = self.pitch = 0.0
+        self.q = q
+        self.chain = chain
+        self.rows, pitching = base_rows(chain.frame, roll, self.pitch, yaw)
+        self.attitude_axes: Rows = chain.frame[0], pitching, self.rows[2]
+        if s.robot.planar:
+            self.attitude_axes = ZERO, ZERO, self.rows[2]
+
+    @lazy
+    def twists(self) -> Array:
+        """How the base frame moves for each of [w, phi_1 .. phi_(n_h)], (6, 6 + n_h).
+
+        Linear velocity at its origin and angular velocity, in base coordinates. Nothing for z, R
+        and P of a planar snake.
+        """
+        shifting = [(row, ZERO) for row in self.rows]
+        if self.s.robot.planar:
+            shifting[2] = (ZERO, ZERO)
+        turning = [(cross(self.chain.tip, axis), axis) for axis in self.attitude_axes]
+        everything = (*shifting, *turning, *self.chain.twists)
+        return np.array([(*linear, *angular) for linear, angular in everything]).T
+
+    @lazy
+    def base_rotation(self) -> Array:
+        """Columns are the axes of the base frame in the world, (3, 3)."""
+        return np.array(self.rows)
+
+    @lazy
+    def base_origin(self) -> Array:
+        """Front end of link n_h + 1 in the world, (3,)."""
+        x, y, z = self.q[:3].tolist()
+        if self.s.robot.planar:
+            z = self.s.robot.wheel_radius_m
+        tip = self.chain.tip
+        a, b, c = self.rows
+        return np.array([x - dot(a, tip), y - dot(b, tip), z - dot(c, tip)])
+
+    @property
+    def head_points(self) -> Array:
+        """Front ends of links 1 .. n_h+1 in the world, (n_h+1, 3)."""
+        return self._in_world([self.chain.tip, *self.chain.pivots])
+
+    @property
+    def head_centers(self) -> Array:
+        """Centres of links 1 .. n_h in the world, (n_h, 3)."""
+        return self._in_world(self.chain.centers)
+
+    @property
+    def head_axes(self) -> Array:
+        """Axis of each head joint in the world, (n_h, 3)."""
+        axes = np.reshape([axis for _, axis in self.chain.twists], (self.s.n_h, 3))
+        return axes @ self.base_rotation.T
+
+    def _in_world(self, points: list[Vector]) -> Array:
+        return self.base_origin + np.reshape(points, (len(points), 3)) @ self.base_rotation.T
 
     def to_world(self, points: Array) -> Array:
         """Return points given in base coordinates, (..., 2), in the world, (..., 3)."""
@@ -83,78 +163,28 @@ def geometry(robot: RobotConfig, q: ArrayLike) -> Geometry:
     q = np.asarray(q, dtype=float)
     if q.shape != (s.n + 5,):
         raise ModelError(f"q has shape {q.shape}; expected ({s.n + 5},) for {s.n} links")
-    if not np.isfinite(q).all():
+    # The sum of squares is quicker; where it overflows, every component is looked at.
+    if not math.isfinite(q.dot(q)) and not np.isfinite(q).all():
         bad = [i for i in range(len(q)) if not np.isfinite(q[i])]
         raise ModelError(f"q is not finite at index {bad}")
-    half = robot.half_length_m
-    rpy, point = q[3:6], q[:3]
-    if robot.planar:
-        rpy = np.array([0.0, 0.0, q[5]])
-        point = np.array([q[0], q[1], robot.wheel_radius_m])
-    rotation = rotation_from_rpy(rpy)
-    points, centers, axes = [point], [], []
-    for joint in range(s.n_h):
-        forward = rotation[:, 0]
-        centers.append(point - half * forward)
-        point = point - 2 * half * forward
-        points.append(point)
-        axes.append(rotation @ s.axes[joint])
-        rotation = rotation @ _joint_rotation(s.axes[joint], q[6 + joint])
-    head_points, head_axes = np.array(points), np.reshape(axes, (s.n_h, 3))
-    twists = _twists(rpy, rotation, head_points, head_axes)
-    if robot.planar:
-        twists[:, 2:5] = 0.0
-
-    base = planar_base(s, q[6 + s.n_h :])
-    return Geometry(
-        s=s,
-        x=base.x,
-        y=base.y,
-        centers=base.centers,
-        hitches=base.hitches,
-        q=q,
-        base_rotation=rotation,
-        base_origin=point,
-        head_points=head_points,
-        head_centers=np.reshape(centers, (s.n_h, 3)),
-        head_axes=head_axes,
-        twists=twists,
-    )
+    return Geometry(s, q, head_chain(s, q[6 : 6 + s.n_h].tolist()))
 
 
 def planar_base(s: Structure, base_angles: Array) -> PlanarBase:
     """Return the base part for the angles of joints n_h+1 .. n-1, (n_b - 1,) [rad]."""
-    half = s.robot.half_length_m
-    heading = np.concatenate(([0.0], np.cumsum(base_angles)))
-    x = np.stack((np.cos(heading), np.sin(heading)), axis=1)
-    y = np.stack((-x[:, 1], x[:, 0]), axis=1)
-    ends = -2 * half * np.cumsum(x, axis=0)
-    return PlanarBase(s=s, x=x, y=y, centers=ends + half * x, hitches=ends[:-1])
+    return PlanarBase(s, base_angles)
 
 
-def _joint_rotation(axis: Array, angle: float) -> Array:
-    c, s = np.cos(angle), np.sin(angle)
-    if axis[1]:
-        return np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
-    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-
-
-def _twists(rpy: Array, base_rotation: Array, points: Array, axes: Array) -> Array:
-    turning = np.hstack((rpy_rate_map(rpy), axes.T))
-    # R, P, Y turn about the tip; joint i turns about the front end of link i + 1.
-    pivots = points[[0, 0, 0, *range(1, len(points))]]
-    twists = np.zeros((6, 3 + turning.shape[1]))
-    twists[:3, :3] = base_rotation.T
-    twists[:3, 3:] = base_rotation.T @ cross(turning, (points[-1] - pivots).T)
-    twists[3:, 3:] = base_rotation.T @ turning
-    return twists
+def in_plane(points: Plane) -> Array:
+    """Return x + i y as pairs (x, y), (..., 2)."""
+    return points.view(float).reshape(*points.shape, 2)
 
 
 def link_points(robot: RobotConfig, q: ArrayLike) -> Array:
     """Return the front ends of links 1 .. n and the tail's end in the world, (n+1, 3) [m]."""
     g = geometry(robot, q)
-    tail = g.centers[-1] - robot.half_length_m * g.x[-1]
-    return np.vstack((g.head_points, g.to_world(np.vstack((g.hitches, tail)))))
+    tail = in_plane(g.fronts[-1:] - g.links[-1:])
+    return np.vstack((g.head_points, g.to_world(g.hitches), g.to_world(tail)))
 
 
 def link_centers(g: Geometry) -> Array:

@@ -37,9 +37,6 @@ def internal_motion_basis(k: Kinematics) -> Array:
 
     Returns:
         Shape (n - 1, m), columns as ``phi_tilde``: H-SCPs, then B-SCPs.
-
-    Raises:
-        SingularError: B_tilde has no inverse.
     """
     s = k.s
     N = np.zeros((s.n - 1, s.m))
@@ -69,9 +66,6 @@ def all_joint_velocities(k: Kinematics, w_dot: ArrayLike, eta: ArrayLike) -> Arr
         k: kinematics of the posture.
         w_dot: head velocity, one entry for each column of A_bar [m/s, rad/s].
         eta: internal motion [eta_h, eta_b], (m,) [rad/s].
-
-    Raises:
-        SingularError: B_tilde has no inverse.
     """
     return least_joint_velocities(k, w_dot) + internal_motion_basis(k) @ np.asarray(eta)
 

@@ -2,24 +2,31 @@
 
 from __future__ import annotations
 
-import functools
+import math
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from snake_control.config import RobotConfig
 from snake_control.model.geometry import Geometry, geometry
-from snake_control.model.manipulability import V_h
+from snake_control.model.lazy import lazy
 from snake_control.model.redundancy import Kinematics, kinematics
 from snake_control.model.singular_shape import SingularShape, singular_shape
-from snake_control.model.singularity import log_V_b1
+from snake_control.model.singularity import GramDeterminant, attitude_log, attitude_log_gradient
 from snake_control.model.stability import Support, support
+from snake_control.model.vector import ZERO, Vector, along, dot
 
 Array = NDArray[np.float64]
+
+_LARGEST_LOG = 345.0
+"""V_b1 is kept within some 1e-150 .. 1e150, so that nothing computed from it overflows."""
 
 
 class Posture:
     """What cost functions and control laws read; gradients are by q, (n + 5,) each.
+
+    All of it is finite, also in singular postures: logarithms and V_b1 are kept within what doubles
+    hold, and logarithmic gradients are damped there (``snake_control.model.damping``).
 
     Attributes:
         robot: the robot.
@@ -41,52 +48,105 @@ class Posture:
         self.g: Geometry = geometry(robot, q)
         self.k: Kinematics = kinematics(self.g)
 
-    @functools.cached_property
-    def _V_h(self) -> tuple[float, Array]:
-        return V_h(self.g, self.k)
-
-    @functools.cached_property
-    def _log_V_b1(self) -> tuple[float, Array]:
-        return log_V_b1(self.g, self.k, self.V_h_gradient / self.V_h, self.V_h)
-
-    @property
+    @lazy
     def V_h(self) -> float:
-        """Manipulability of the head part (29)."""
-        return self._V_h[0]
+        """Manipulability of the head part, V_h = |det B_tilde| (29).
+
+        B_tilde is block triangular and the base block has l on its diagonal, so it is |det head
+        block| l^(n_b - m_b - 1); constant for a planar snake.
+        """
+        s = self.k.s
+        half = self.robot.half_length_m
+        scale = half ** len(s.theta_b)
+        # Two rows of the head block were divided by l.
+        return scale if s.robot.planar else scale * self.k.head.determinant * half**2
 
     @property
+    def V_h_by_head(self) -> list[float]:
+        """Derivative of V_h by each head joint, n_h numbers: all that (25) needs."""
+        by_joints, _ = self._V_h_parts
+        return by_joints
+
+    @lazy
     def V_h_gradient(self) -> Array:
-        """Gradient of V_h."""
-        return self._V_h[1]
+        """Gradient of V_h; exact in singular postures, too."""
+        return self._by_head(*self._V_h_parts)
 
-    @property
+    @lazy
+    def log_V_h_gradient(self) -> Array:
+        """Gradient of log V_h, damped near a singular head posture."""
+        return self._by_head(*self._log_V_h_parts)
+
+    @lazy
+    def _V_h_parts(self) -> tuple[list[float], Vector]:
+        """Derivative of V_h by head joints and by turning the base frame."""
+        if self.k.damping == 0.0:
+            scale, (by_joints, by_turning) = self.V_h, self._log_V_h_parts
+        else:
+            scale = self.robot.half_length_m ** (2 + len(self.k.s.theta_b))
+            by_joints, by_turning = self.k.head.gradient(self.k.head.cofactors)
+        return [scale * value for value in by_joints], along(ZERO, scale, by_turning)
+
+    @lazy
+    def _log_V_h_parts(self) -> tuple[list[float], Vector]:
+        if self.robot.planar:
+            return [], ZERO
+        return self.k.head.gradient(self.k.head.inverse)
+
+    @lazy
     def log_V_b1(self) -> float:
-        """Logarithm of V_b1 (30); -inf in a singular posture."""
-        return self._log_V_b1[0]
+        """Logarithm of V_b1 (30); near a singular head posture that of the damping's threshold."""
+        log = self._gram.log
+        half = math.log(self.robot.half_length_m)
+        if self.robot.planar:
+            log -= 4.0 * half
+        else:
+            log += attitude_log(self.g) - 6.0 * half - 2.0 * self.k.head.log_determinant
+        return min(max(log, -_LARGEST_LOG), _LARGEST_LOG)
+
+    @lazy
+    def log_V_b1_gradient(self) -> Array:
+        """Gradient of log V_b1."""
+        n_h = self.k.s.n_h
+        gradient = -2.0 * self.log_V_h_gradient
+        if n_h:
+            gradient[3 : 6 + n_h] += attitude_log_gradient(self.g)
+        gradient[6 + n_h :] = self.log_V_b1_by_base
+        return gradient
+
+    @lazy
+    def log_V_b1_by_base(self) -> Array:
+        """Derivative of log V_b1 by the base joint angles, (n_b - 1,): all that (27) needs."""
+        return 2.0 * self.k.base.gradient(self._gram.transposed_pseudo_inverse())
 
     @property
-    def log_V_b1_gradient(self) -> Array:
-        """Gradient of log V_b1; zero in a singular posture."""
-        return self._log_V_b1[1]
-
-    @functools.cached_property
     def V_b1(self) -> float:
-        """V_b1 = det(E_tilde E_tilde^T) (30); infinite where it leaves the range of doubles."""
-        with np.errstate(over="ignore"):
-            return float(np.exp(self.log_V_b1))
+        """V_b1 = det(E_tilde E_tilde^T) (30), within 1e-150 .. 1e150."""
+        return math.exp(self.log_V_b1)
 
     @property
     def V_b1_gradient(self) -> Array:
-        """Gradient of V_b1; not finite where V_b1 is infinite."""
-        with np.errstate(over="ignore", invalid="ignore"):
-            return self.V_b1 * self.log_V_b1_gradient
+        """Gradient of V_b1."""
+        return self.V_b1 * self.log_V_b1_gradient
 
-    @functools.cached_property
+    @lazy
     def singular_shape(self) -> SingularShape:
         """The singular shape of Fig. 5 that is next, and how near it is."""
         return singular_shape(self.g)
 
-    @functools.cached_property
+    @lazy
     def support(self) -> Support:
         """Support polygon and d_min (30); its gradient waits, too."""
         return support(self.g)
+
+    @lazy
+    def _gram(self) -> GramDeterminant:
+        return GramDeterminant(self.k.base.N)
+
+    def _by_head(self, by_joints: list[float], by_turning: Vector) -> Array:
+        """Return a gradient by q of what depends on head joints and the base's attitude alone."""
+        n_h = self.k.s.n_h
+        gradient = np.zeros(self.k.s.n + 5)
+        gradient[3:6] = [dot(by_turning, axis) for axis in self.g.attitude_axes]
+        gradient[6 : 6 + n_h] = by_joints
+        return gradient

@@ -1,28 +1,28 @@
-"""SCPs in the kinematics: equations (7)-(11), and E_tilde of (17)."""
+"""SCPs in the kinematics: equations (7)-(11), and E_tilde of (17).
+
+B_tilde is block triangular: four rows give the head joints of theta_bar (``HeadBlock``), then every
+driven link gives the joint in front of it (``BaseMap``). The control path uses these two and never
+the whole matrices, which are there for people, tests and the dynamics.
+"""
 
 from __future__ import annotations
-
-import dataclasses
-import functools
 
 import numpy as np
 from numpy.typing import NDArray
 
-from snake_control.errors import SingularError
+from snake_control.model.base_map import BaseMap
 from snake_control.model.constraints import constraint_matrix
 from snake_control.model.geometry import Geometry
+from snake_control.model.head_block import HeadBlock
+from snake_control.model.lazy import lazy
 from snake_control.model.structure import Structure
+from snake_control.model.vector import Twist, along, combine, cross
 
 Array = NDArray[np.float64]
 
-# Below this, 4 x 4 head blocks of unit rows and decimetre columns carry no digits worth using.
-_SINGULAR = 1e-10
-_SUBSTITUTE_AT_ONCE = 8
 
-
-@dataclasses.dataclass(frozen=True, eq=False)
 class Kinematics:
-    """The constraint matrix of one posture, cut up as the paper does.
+    """The constraints of one posture, cut up as the paper does; each matrix when it is asked for.
 
     Rows: wheeled base links ascending, v_z, omega_x, omega_y. Columns of ``A_tilde`` and ``F_bar``:
     w, H-SCPs, B-SCPs; of ``B_tilde``: theta_bar, rising. Shapes are those of a robot with a raised
@@ -30,33 +30,40 @@ class Kinematics:
 
     Attributes:
         s: index sets of the robot.
-        G: constraint matrix, G q_dot = 0, (n_b - m_b + 3, n + 5).
     """
 
     s: Structure
-    G: Array
 
-    @functools.cached_property
+    def __init__(self, g: Geometry) -> None:
+        self.s = g.s
+        self._g = g
+
+    @lazy
+    def G(self) -> Array:
+        """Constraint matrix, G q_dot = 0, (n_b - m_b + 3, n + 5)."""
+        return constraint_matrix(self._g)
+
+    @lazy
     def A_bar(self) -> Array:
         """Equation (3), (n_b - m_b + 3, 6)."""
         return self.G[:, self.s.w]
 
-    @functools.cached_property
+    @lazy
     def B_bar(self) -> Array:
         """Equation (3), (n_b - m_b + 3, n - 1)."""
         return -self.G[:, 6:]
 
-    @functools.cached_property
+    @lazy
     def A_tilde(self) -> Array:
         """Equation (7), (n_b - m_b + 3, 6 + m)."""
         return np.hstack((self.A_bar, self.G[:, 6 + self.s.scp]))
 
-    @functools.cached_property
+    @lazy
     def B_tilde(self) -> Array:
         """Equation (7), square of size n - m - 1."""
         return self.B_bar[:, self.s.theta]
 
-    @functools.cached_property
+    @lazy
     def head_block(self) -> Array:
         """Rows of B_tilde that only the head joints of theta_bar enter, 4 x 4.
 
@@ -64,38 +71,111 @@ class Kinematics:
         """
         return self.B_bar[np.ix_(self.s.head_rows, self.s.theta_h)]
 
-    @functools.cached_property
+    @lazy
+    def head(self) -> HeadBlock:
+        """The same four rows, free of units, and their inverse. Not for a planar snake."""
+        return HeadBlock(self._g)
+
+    @lazy
+    def base(self) -> BaseMap:
+        """The base joints' velocities per motion of the first base link and per B-SCP."""
+        return BaseMap(self._g)
+
+    def solve_head(self, right: Array) -> Array:
+        """Return the inverse of ``head_block``, damped where ``damping`` says so, times ``right``.
+
+        Args:
+            right: rows as ``head_block``, (4, ...); no rows for a planar snake.
+        """
+        if self.s.robot.planar:
+            return np.zeros_like(right)
+        half = self.s.robot.half_length_m
+        units = np.array((1.0 / half, 1.0 / half, 1.0, 1.0))
+        # The head block of B_tilde is that of ``head`` with the opposite sign.
+        return -(np.array(self.head.inverse) * units).dot(right)
+
+    @property
+    def damping(self) -> float:
+        """Share of the motion in B_tilde's weakest direction that is given up, 0 .. 1.
+
+        0: every inverse here is exact. See ``snake_control.model.damping``.
+        """
+        return 0.0 if self.s.robot.planar else self.head.damping
+
+    @lazy
+    def head_scp_motion(self) -> list[list[float]]:
+        """Velocities of head joints 1 .. n_h per H-SCP, the head pose at rest: m_h lists."""
+        s = self.s
+        motions = []
+        for scp in s.head_scps:
+            answer = self.head.answer(self.head.by_joint[scp])
+            motion = [0.0] * s.n_h
+            motion[scp] = 1.0
+            for joint, velocity in zip(s.head_joints, answer, strict=True):
+                motion[joint] = velocity
+            motions.append(motion)
+        return motions
+
+    @property
+    def base_scp_motion(self) -> Array:
+        """Velocities of joints n_h+1 .. n-1 per B-SCP, what is in front at rest, (n_b-1, m_b)."""
+        return self.base.N[:, self.s.base.entries :]
+
+    @lazy
     def F_bar(self) -> Array:
         """Equation (8): theta_bar_dot = F_bar w_tilde_dot, (n - m - 1, 6 + m).
 
-        B_tilde is block triangular, so the head joints follow from four rows and the base joints
-        by substitution. The zero block of (10) is exact.
-
-        Raises:
-            SingularError: the head block has no inverse.
+        The zero block of (10) is exact. Damped near a singular head posture, see ``damping``.
         """
-        s = self.s
-        F_head: Array = np.zeros((len(s.theta_h), len(s.w) + s.m))
-        if len(s.theta_h):
-            sigma = np.linalg.svd(self.head_block, compute_uv=False)[-1]
-            if not sigma > _SINGULAR:
-                raise SingularError("B_tilde", float(sigma))
-            F_head[:] = np.linalg.solve(self.head_block, self.A_tilde[s.head_rows])
-            # The head block never sees a B-SCP; solve() would leave round-off there.
-            F_head[:, len(s.w) + s.m_h :] = 0.0
-        rows = s.base_rows
-        right = self.A_tilde[rows] - self.B_bar[rows][:, s.theta_h] @ F_head
-        F_base = _substitute(self.B_bar[rows][:, s.theta_b], right)
-        return np.vstack((F_head, F_base))
+        s, entries = self.s, self.s.base.entries
+        head, moved_by_head = len(s.theta_h), len(s.w) + s.m_h
+        inputs = np.concatenate((s.w, 6 + s.scp_h))
+        twists = self._g.twists
+        entry = s.base.entry_rows.dot(twists)
+        by_base = self.base.N[s.theta_b - s.n_h]
+        F_bar = np.zeros((len(s.theta), moved_by_head + s.m_b))
+        by_entry = entry[:, inputs]
+        if head:
+            columns = twists[:, inputs].T.tolist()
+            measured = self.head.measure([(tuple(c[:3]), tuple(c[3:])) for c in columns])
+            F_head = np.transpose([self.head.answer(value) for value in measured])
+            F_bar[:head, :moved_by_head] = F_head
+            by_entry = by_entry + entry[:, 6 + s.theta_h].dot(F_head)
+        F_bar[head:, :moved_by_head] = by_base[:, :entries].dot(by_entry)
+        F_bar[head:, moved_by_head:] = by_base[:, entries:]
+        return F_bar
 
-    @functools.cached_property
+    def joint_velocities(self, w_dot: list[float], phi_tilde_dot: list[float]) -> Array:
+        """Return u of (22), see the function of that name, without forming F_bar."""
+        s, g = self.s, self._g
+        motion = _motion_by_w(g, w_dot)
+        (forward, sideways, _), (_, _, turning) = motion
+        velocities = [0.0] * s.n_h
+        if s.n_h:
+            answer = self.head.answer(*self.head.measure((motion,)))
+            for joint, velocity in zip(s.head_joints, answer, strict=True):
+                velocities[joint] = velocity
+            for rate, by_scp in zip(phi_tilde_dot, self.head_scp_motion, strict=False):
+                velocities = [v + rate * each for v, each in zip(velocities, by_scp, strict=True)]
+            for velocity, ((vx, vy, _), (_, _, wz)) in zip(velocities, g.chain.twists, strict=True):
+                forward += velocity * vx
+                sideways += velocity * vy
+                turning += velocity * wz
+        half = s.robot.half_length_m
+        entry = [forward / half, turning]
+        if s.robot.planar:
+            entry.insert(1, sideways / half)
+        entry += phi_tilde_dot[s.m_h :]
+        return np.concatenate((velocities, self.base.N.dot(entry)))
+
+    @lazy
     def A_hat(self) -> Array:
         """Equation (11), (n - 1, 6 + m)."""
         s = self.s
         lower = np.hstack((np.zeros((s.m, len(s.w))), np.eye(s.m)))
         return np.vstack((np.hstack((self.A_bar, np.zeros((len(self.G), s.m)))), lower))
 
-    @functools.cached_property
+    @lazy
     def B_hat(self) -> Array:
         """Equation (11), square of size n - 1 (with b_ks = 1 at s = i_k - 1)."""
         s = self.s
@@ -103,7 +183,7 @@ class Kinematics:
         selection[np.arange(s.m), s.scp] = 1.0
         return np.vstack((self.B_bar, selection))
 
-    @functools.cached_property
+    @lazy
     def E_tilde(self) -> Array:
         """Equations (17), (20): E_tilde = [I F_bar^T] T^T E, (6 + m, n - 1)."""
         s = self.s
@@ -112,12 +192,12 @@ class Kinematics:
         E[:, s.theta] = self.F_bar.T
         return E
 
-    @functools.cached_property
+    @lazy
     def sigma_min_B_tilde(self) -> float:
         """Smallest singular value of B_tilde."""
         return float(np.linalg.svd(self.B_tilde, compute_uv=False)[-1])
 
-    @functools.cached_property
+    @lazy
     def sigma_min_A_hat(self) -> float:
         """Smallest singular value of A_hat, whose blocks are A_bar and a unit matrix."""
         return float(min(np.linalg.svd(self.A_bar, compute_uv=False)[-1], 1.0))
@@ -125,7 +205,7 @@ class Kinematics:
 
 def kinematics(g: Geometry) -> Kinematics:
     """Return the kinematic quantities of one posture."""
-    return Kinematics(g.s, constraint_matrix(g))
+    return Kinematics(g)
 
 
 def joint_velocities(k: Kinematics, w_dot: Array, phi_tilde_dot: Array) -> Array:
@@ -137,31 +217,20 @@ def joint_velocities(k: Kinematics, w_dot: Array, phi_tilde_dot: Array) -> Array
         phi_tilde_dot: wanted SCP velocities, H-SCPs first, (m,) [rad/s].
 
     Returns:
-        u = B_hat^-1 A_hat w_tilde_dot, (n - 1,) [rad/s].
-
-    Raises:
-        SingularError: B_tilde has no inverse.
+        u = B_hat^-1 A_hat w_tilde_dot, (n - 1,) [rad/s]; damped near a singular head posture.
     """
-    u = np.empty(k.s.n - 1)
-    u[k.s.scp] = phi_tilde_dot
-    u[k.s.theta] = k.F_bar @ np.concatenate((w_dot, phi_tilde_dot))
-    return u
+    return k.joint_velocities(np.asarray(w_dot).tolist(), np.asarray(phi_tilde_dot).tolist())
 
 
-def _substitute(lower: Array, right: Array) -> Array:
-    """Solve a lower triangular system by rows, in halves.
-
-    On long robots F_bar grows by orders of magnitude along the body; pivoting mixes these and loses
-    the small entries, substitution keeps every row to full precision.
-    """
-    size = len(lower)
-    if size <= _SUBSTITUTE_AT_ONCE:
-        solution = np.empty_like(right)
-        for row in range(size):
-            done = right[row] - lower[row, :row] @ solution[:row]
-            solution[row] = done / lower[row, row]
-        return solution
-    half = size // 2
-    head = _substitute(lower[:half, :half], right[:half])
-    tail = _substitute(lower[half:, half:], right[half:] - lower[half:, :half] @ head)
-    return np.vstack((head, tail))
+def _motion_by_w(g: Geometry, w_dot: list[float]) -> Twist:
+    """Return how the base frame moves with the head pose while the head joints rest."""
+    if g.s.robot.planar:
+        x_dot, y_dot, yaw_dot = w_dot
+        z_dot = roll_dot = pitch_dot = 0.0
+    else:
+        x_dot, y_dot, z_dot, roll_dot, pitch_dot, yaw_dot = w_dot
+    a, b, c = g.rows
+    rolling, pitching, yawing = g.attitude_axes
+    angular = along(combine(roll_dot, rolling, pitch_dot, pitching), yaw_dot, yawing)
+    linear = along(combine(x_dot, a, y_dot, b), z_dot, c)
+    return along(linear, 1.0, cross(g.chain.tip, angular)), angular

@@ -38,12 +38,12 @@ def rpy_from_rotation(rotation: ArrayLike) -> Array:
 
     At P = +-pi/2 roll and yaw are one and the same rotation; roll is then 0.
     """
-    m = np.asarray(rotation, dtype=float)
-    horizontal = math.hypot(m[0, 0], m[1, 0])
-    pitch = math.atan2(-m[2, 0], horizontal)
+    (xx, yx, _), (xy, yy, _), (xz, yz, zz) = np.asarray(rotation, dtype=float).tolist()
+    horizontal = math.hypot(xx, xy)
+    pitch = math.atan2(-xz, horizontal)
     if horizontal < 1e-12:
-        return np.array([0.0, pitch, math.atan2(-m[0, 1], m[1, 1])])
-    return np.array([math.atan2(m[2, 1], m[2, 2]), pitch, math.atan2(m[1, 0], m[0, 0])])
+        return np.array([0.0, pitch, math.atan2(-yx, yy)])
+    return np.array([math.atan2(yz, zz), pitch, math.atan2(xy, xx)])
 
 
 def rpy_rate_map(rpy: ArrayLike) -> Array:
@@ -90,6 +90,11 @@ def rpy_from_quaternion(quaternion: ArrayLike) -> Array:
 def wrap(angle: ArrayLike) -> Array:
     """Return angles in [-pi, pi), elementwise [rad]."""
     return np.mod(np.asarray(angle, dtype=float) + math.pi, 2 * math.pi) - math.pi
+
+
+def wrap_angle(angle: float) -> float:
+    """Return one angle in [-pi, pi) [rad]."""
+    return (angle + math.pi) % (2 * math.pi) - math.pi
 
 
 def unwrap_near(rpy: ArrayLike, previous: ArrayLike) -> Array:

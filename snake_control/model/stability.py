@@ -1,148 +1,185 @@
-"""The support polygon and d_min, the margin against falling (30), Fig. 4."""
+"""The support polygon and d_min, the margin against falling (30), Fig. 4.
+
+Distances on the floor are worked out in base coordinates as seen from above: projected along the
+world's z axis, turned and shifted with the base.
+"""
 
 from __future__ import annotations
 
-import dataclasses
-import functools
 import math
 
 import numpy as np
 from numpy.typing import NDArray
 
-from snake_control.model.geometry import Geometry, link_centers, wheel_contacts
+from snake_control.model.convex_hull import convex_hull
+from snake_control.model.geometry import Geometry, Plane, in_plane
+from snake_control.model.lazy import lazy
+from snake_control.model.vector import ZERO, Vector, along, combine, cross, dot
 
 Array = NDArray[np.float64]
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
 class Support:
     """How the robot stands.
 
     Attributes:
         d_min: signed distance from P_G to the nearest edge of the support polygon [m]; positive
             inside, negative once the robot tips.
-        center_of_mass: P_G, the centre of mass seen from above, (2,) [m].
-        polygon: corners of the support polygon, counter-clockwise, (k, 2) [m].
     """
 
     d_min: float
-    center_of_mass: Array
-    polygon: Array
-    _g: Geometry
-    _ends: tuple[int, int]
-    _share: float
 
-    @functools.cached_property
+    def __init__(self, g: Geometry) -> None:
+        self._g = g
+        points = _wheel_points(g)
+        self._wheels: list[complex] = points.tolist()
+        self._center = _center_of_mass(g)
+        a, b, _ = g.rows
+        # A polygon seen from above has the same corners as in the plane of the base; in the other
+        # order, if that lies on its back.
+        self._hull = convex_hull(points, self._wheels)
+        if g.rows[2][2] < 0.0:
+            self._hull.reverse()
+        self._corners = _from_above(g, [self._wheels[corner] for corner in self._hull])
+        self._below = complex(dot(a, self._center), dot(b, self._center))
+        self._edge, self._share, self.d_min = nearest_edge(self._corners, self._below)
+
+    @lazy
+    def polygon(self) -> Array:
+        """Corners of the support polygon, counter-clockwise, (k, 2) [m]."""
+        return self._g.base_origin[:2] + in_plane(np.array(self._corners))
+
+    @lazy
+    def center_of_mass(self) -> Array:
+        """P_G, the centre of mass seen from above, (2,) [m]."""
+        return self._g.base_origin[:2] + (self._below.real, self._below.imag)
+
+    @lazy
     def gradient(self) -> Array:
         """Gradient of d_min by q, (n + 5,).
 
         d_min is not smooth where the nearest edge changes: there it is the gradient for the edge
         that comes first in ``polygon``.
         """
-        contacts = wheel_contacts(self._g).reshape(-1, 2)
-        first, second = self._ends
-        p, q = contacts[first], contacts[second]
-        edge = (q - p) / math.hypot(*(q - p))
-        # On an edge its normal is exact even at distance 0; beyond a corner it points there.
-        if 0 < self._share < 1:
-            normal = np.array([-edge[1], edge[0]])
+        n_h = self._g.s.n_h
+        gradient = np.zeros(self._g.s.n + 5)
+        gradient[3 : 6 + n_h] = self._by_head()
+        gradient[6 + n_h :] = self.by_base
+        return gradient
+
+    def _normal(self) -> Vector:
+        """Direction in which P_G moves away from the edge fastest, in base coordinates."""
+        begin, end = self._corners[self._edge], self._corners[self._edge + 1 - len(self._corners)]
+        if 0.0 < self._share < 1.0 or self.d_min == 0.0:
+            # On an edge its normal is exact even at distance 0; beyond a corner it points there.
+            normal = 1j * (end - begin) / abs(end - begin)
         else:
-            nearest = (1 - self._share) * p + self._share * q
-            normal = (self.center_of_mass - nearest) / self.d_min
-        gradient: Array = normal @ (
-            _center_of_mass_jacobian(self._g)
-            - (1 - self._share) * _contact_jacobian(self._g, first)
-            - self._share * _contact_jacobian(self._g, second)
-        )
+            normal = (self._below - begin - self._share * (end - begin)) / self.d_min
+        return combine(normal.real, self._g.rows[0], normal.imag, self._g.rows[1])
+
+    def _feet(self) -> tuple[tuple[int, float], tuple[int, float]]:
+        """The two wheels whose contacts make the edge, each with its share of the nearest point."""
+        first, second = self._hull[self._edge], self._hull[self._edge + 1 - len(self._hull)]
+        return (first, 1.0 - self._share), (second, self._share)
+
+    def _by_head(self) -> list[float]:
+        """Derivative by R, P, Y, phi_1 .. phi_(n_h), which move both contacts.
+
+        What lies behind a joint turns about it: P_G by its share of the mass, the contacts whole.
+        """
+        g, normal = self._g, self._normal()
+        foot = sum(share * self._wheels[wheel] for wheel, share in self._feet())
+        arm = along(self._center, -1.0, (foot.real, foot.imag, 0.0))
+        lever = cross(arm, normal)
+        gradient = [dot(axis, lever) for axis in g.attitude_axes]
+        ahead, moment = 0.0, ZERO
+        chain = g.chain
+        for (_, axis), pivot, center, mass in zip(
+            chain.twists, chain.pivots, chain.centers, g.s.head_mass, strict=True
+        ):
+            ahead += mass
+            moment = along(moment, mass, center)
+            # The links ahead of the joint stay: arm without their part of P_G about the pivot.
+            stays = along(moment, -ahead, pivot)
+            gradient.append(dot(axis, cross(along(arm, -1.0, stays), normal)))
+        return gradient
+
+    @lazy
+    def by_base(self) -> Array:
+        """Derivative of d_min by the base joint angles, (n_b - 1,): all that (27) needs."""
+        g, base = self._g, self._g.s.base
+        # The nearest point of the edge counts as a mass of -1 at its wheels: what lies behind a
+        # joint then has no mass but a moment, whose arm turns with the joint.
+        masses = base.mass.copy()
+        moments = masses * g.middles
+        for wheel, share in self._feet():
+            link = base.wheel_links[wheel]
+            masses[link] -= share
+            moments[link] -= share * self._wheels[wheel]
+        arms = np.add.accumulate(moments[:0:-1])
+        arms -= np.add.accumulate(masses[:0:-1]) * g.fronts[:0:-1]
+        x, y, _ = self._normal()
+        gradient: Array = (arms * complex(y, x)).real[::-1]
         return gradient
 
 
 def support(g: Geometry) -> Support:
     """Return support polygon, P_G and d_min of one posture; the gradient only when asked for."""
-    contacts = wheel_contacts(g).reshape(-1, 2)
-    center_of_mass = g.s.masses @ link_centers(g)[:, :2] / g.s.masses.sum()
-    hull = convex_hull(contacts)
-    i, j, share, d_min = _nearest_edge(contacts[hull], center_of_mass)
-    return Support(d_min, center_of_mass, contacts[hull], g, (hull[i], hull[j]), share)
+    return Support(g)
 
 
-def convex_hull(points: Array) -> list[int]:
-    """Return the corners of the convex hull, counter-clockwise, as indices into ``points``.
+def _wheel_points(g: Geometry) -> Plane:
+    """Return where the wheels stand in the base plane, all left ones, then all right ones."""
+    wheeled = g.s.wheeled
+    centers = g.middles[wheeled]
+    side = g.forward[wheeled] * (1j * g.s.robot.wheel_offset_m)
+    return np.concatenate((centers + side, centers - side))
+
+
+def _from_above(g: Geometry, points: list[complex]) -> list[complex]:
+    """Return points of the base plane as seen along the world's z axis, shifted with the base."""
+    (ax, ay, _), (bx, by, _), _ = g.rows
+    x, y = complex(ax, bx), complex(ay, by)
+    return [point.real * x + point.imag * y for point in points]
+
+
+def _center_of_mass(g: Geometry) -> Vector:
+    """Return the centre of mass in base coordinates."""
+    base = complex(g.s.base.mass.dot(g.middles))
+    center = (base.real, base.imag, 0.0)
+    for mass, link in zip(g.s.head_mass, g.chain.centers, strict=True):
+        center = along(center, mass, link)
+    return center
+
+
+def nearest_edge(corners: list[complex], point: complex) -> tuple[int, float, float]:
+    """Return the nearest edge of a convex polygon, where on it (0..1), and the signed distance.
 
     Args:
-        points: (k, 2), not all on one line.
+        corners: counter-clockwise; edge i goes from corner i to the next.
+        point: inside (positive distance) or outside.
     """
-    coordinates = points.tolist()
-    order = sorted(range(len(coordinates)), key=coordinates.__getitem__)
-    lower = _half_hull(coordinates, order)
-    upper = _half_hull(coordinates, order[::-1])
-    return lower[:-1] + upper[:-1]
+    nearest = (0, 0.0, math.inf)
+    for i, begin in enumerate(corners):
+        edge = corners[i + 1 - len(corners)] - begin
+        # Real part: along the edge; imaginary part: to its left, which is inside.
+        seen = (point - begin) * edge.conjugate()
+        if seen.imag < 0.0:
+            return _nearest_edge_from_outside(corners, point)
+        length = abs(edge)
+        # From inside, the nearest of the edges' lines is met on the edge itself.
+        if seen.imag < nearest[2] * length:
+            nearest = (i, seen.real / length**2, seen.imag / length)
+    return nearest
 
 
-def _half_hull(points: list[list[float]], order: list[int]) -> list[int]:
-    chain: list[int] = []
-    for index in order:
-        x, y = points[index]
-        while len(chain) > 1:
-            ox, oy = points[chain[-2]]
-            ax, ay = points[chain[-1]]
-            if (ax - ox) * (y - oy) - (ay - oy) * (x - ox) > 0:
-                break
-            chain.pop()
-        chain.append(index)
-    return chain
-
-
-def _nearest_edge(corners: Array, point: Array) -> tuple[int, int, float, float]:
-    """Return corner indices of the nearest edge, where on it (0..1), and the signed distance."""
-    nearest = (0, 0, 0.0, math.inf)
-    outside = False
-    px, py = point
-    points = corners.tolist()
-    for i, (ax, ay) in enumerate(points):
-        j = (i + 1) % len(points)
-        ex, ey = points[j][0] - ax, points[j][1] - ay
-        length_squared = ex * ex + ey * ey
-        share = min(1.0, max(0.0, ((px - ax) * ex + (py - ay) * ey) / length_squared))
-        outside |= ex * (py - ay) - ey * (px - ax) < 0
-        distance = math.hypot(px - ax - share * ex, py - ay - share * ey)
-        if distance < nearest[3]:
-            nearest = (i, j, share, distance)
-    i, j, share, distance = nearest
-    return i, j, share, -distance if outside else distance
-
-
-def _center_of_mass_jacobian(g: Geometry) -> Array:
-    """Velocity of P_G per q_dot, (2, n + 5)."""
-    s = g.s
-    masses = s.masses
-    moments = masses[:, None] * link_centers(g)
-    # Mass and first moment of the links behind each joint.
-    mass_behind = np.cumsum(masses[::-1])[::-1]
-    moment_behind = np.cumsum(moments[::-1], axis=0)[::-1]
-    jacobian = np.zeros((2, s.n + 5))
-    jacobian[0, 0] = jacobian[1, 1] = 1.0
-    angular = (g.base_rotation @ g.twists[3:]).T
-    axes = np.vstack((angular[3:], np.broadcast_to(g.base_rotation[:, 2], (s.n_b - 1, 3))))
-    tip = g.head_points[:1]
-    pivots = np.vstack((tip, tip, tip, g.head_points[1:], g.to_world(g.hitches)))
-    mass = np.concatenate((np.full(3, mass_behind[0]), mass_behind[1:]))
-    moment = np.vstack((np.broadcast_to(moment_behind[0], (3, 3)), moment_behind[1:]))
-    arms = (moment - mass[:, None] * pivots) / mass_behind[0]
-    jacobian[0, 3:] = axes[:, 1] * arms[:, 2] - axes[:, 2] * arms[:, 1]
-    jacobian[1, 3:] = axes[:, 2] * arms[:, 0] - axes[:, 0] * arms[:, 2]
-    return jacobian
-
-
-def _contact_jacobian(g: Geometry, contact: int) -> Array:
-    """Velocity of one wheel contact, seen from above, per q_dot, (2, n + 5)."""
-    s = g.s
-    link = s.wheeled[contact // 2]
-    side = s.robot.wheel_offset_m * (1 if contact % 2 == 0 else -1)
-    px, py = g.centers[link] + side * g.y[link]
-    v, w = g.twists[:3], g.twists[3:]
-    by_head = np.stack((v[0] - w[2] * py, v[1] + w[2] * px, v[2] + w[0] * py - w[1] * px))
-    by_base = np.zeros((3, s.n_b - 1))
-    by_base[0, :link] = -(py - g.hitches[:link, 1])
-    by_base[1, :link] = px - g.hitches[:link, 0]
-    return g.base_rotation[:2] @ np.hstack((by_head, by_base))
+def _nearest_edge_from_outside(corners: list[complex], point: complex) -> tuple[int, float, float]:
+    nearest = (0, 0.0, -math.inf)
+    for i, begin in enumerate(corners):
+        edge = corners[i + 1 - len(corners)] - begin
+        seen = (point - begin) * edge.conjugate()
+        share = min(1.0, max(0.0, seen.real / abs(edge) ** 2))
+        distance = abs(point - begin - share * edge)
+        if distance < -nearest[2]:
+            nearest = (i, share, -distance)
+    return nearest

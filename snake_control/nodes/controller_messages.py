@@ -68,10 +68,15 @@ class Step:
 
 
 def judge(step: Step, result: ControlResult, robot: RobotConfig) -> None:
-    """Enter a control law's answer, with a status that names the limits that bit."""
+    """Enter a control law's answer, with a status that names what kept it from its reference."""
     names = robot.joint_names
     step.result = result
     found = []
+    if result.damping > 0.0:
+        found.append(
+            f"singular head posture (B_tilde): {100 * result.damping:.0f} % of the motion in its "
+            "weakest direction is given up"
+        )
     if result.speed_limited:
         joints = ", ".join(names[j - 1] for j in result.speed_limited)
         found.append(f"{joints} at its speed limit: all scaled to {result.speed_scale:.2f}")

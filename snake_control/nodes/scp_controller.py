@@ -21,7 +21,7 @@ from std_srvs.srv import SetBool
 from snake_control.config import Config
 from snake_control.control.reference import Reference
 from snake_control.control.scp_controller import ScpController
-from snake_control.errors import ModelError, SingularError
+from snake_control.errors import ModelError
 from snake_control.model.rotation import unwrap_near
 from snake_control.nodes import markers, topics
 from snake_control.nodes.controller_messages import ControllerMessages, Step, judge, too_far
@@ -171,7 +171,7 @@ class ScpControllerNode(Node):
         step.status = ControllerState.STATUS_FAULT
         try:
             result = self._controller.step(q, q_dot, reference, t)
-        except (SingularError, ModelError) as error:
+        except ModelError as error:
             step.text = str(error)
             return
         if not np.isfinite(result.u).all():

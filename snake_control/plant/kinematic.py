@@ -6,22 +6,26 @@ import math
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import lapack
 
 from snake_control.config import RobotConfig
 from snake_control.errors import ModelError
-from snake_control.model.constraints import lateral_joint_map, lateral_map
+from snake_control.model.constraints import lateral_map, lateral_velocities
 from snake_control.model.floor import (
     base_under_head,
+    chain_pose_on_floor,
     gravity_efforts,
-    head_pose_on_floor,
     head_velocity,
 )
-from snake_control.model.geometry import geometry, planar_base
+from snake_control.model.geometry import Geometry, planar_base
+from snake_control.model.head_chain import head_chain
 from snake_control.model.stability import support
 from snake_control.model.structure import structure
 from snake_control.plant.plant import PlantState
 
 Array = NDArray[np.float64]
+
+_FULL_RANK = 1e-6
 
 
 class KinematicPlant:
@@ -77,15 +81,17 @@ class KinematicPlant:
         n_h = self._s.n_h
         links = planar_base(self._s, phi[n_h:])
         rows = lateral_map(links)
-        by_joints = lateral_joint_map(links) @ phi_dot[n_h:]
-        twist = np.linalg.lstsq(rows, -by_joints, rcond=1e-9)[0]
+        by_joints = lateral_velocities(links, phi_dot[n_h:])
+        twist = _least_squares(rows, -by_joints)
+        x, y, turn = twist.tolist()
         c, si = math.cos(base[2]), math.sin(base[2])
-        rate = np.array([c * twist[0] - si * twist[1], si * twist[0] + c * twist[1], twist[2]])
-        return rate, rows @ twist + by_joints
+        rate = np.array((c * x - si * y, si * x + c * y, turn))
+        return rate, rows.dot(twist) + by_joints
 
     def _state(self, planar: Array, phi_dot: Array, slip: Array) -> PlantState:
-        w = head_pose_on_floor(self._robot, self._phi, self._base)
-        g = geometry(self._robot, np.concatenate((w, self._phi)))
+        chain = head_chain(self._s, self._phi[: self._s.n_h].tolist())
+        w = chain_pose_on_floor(self._robot, chain, self._base)
+        g = Geometry(self._s, np.concatenate((w, self._phi)), chain)
         d_min = support(g).d_min
         self._fallen |= d_min < 0
         return PlantState(
@@ -104,3 +110,13 @@ class KinematicPlant:
         if array.shape != (self._s.n - 1,) or not np.isfinite(array).all():
             raise ModelError(f"{what}: expected {self._s.n - 1} finite numbers, got {array}")
         return array
+
+
+def _least_squares(rows: Array, right: Array) -> Array:
+    """Solve for three numbers; of several answers (a singular shape) the smallest."""
+    factors, solution, _ = lapack.dgels(rows, right)
+    diagonal = np.abs(factors.diagonal())
+    if len(rows) >= 3 and diagonal.min() > _FULL_RANK * diagonal.max():
+        found: Array = solution[:3]
+        return found
+    return np.linalg.lstsq(rows, right, rcond=1e-9)[0].astype(float)

@@ -9,7 +9,7 @@ from snake_control.config import ControllerConfig
 from snake_control.control.limits import JointLimits
 from snake_control.control.reference import Reference
 from snake_control.control.scp_controller import ScpController
-from snake_control.errors import ModelError, SingularError
+from snake_control.errors import ModelError
 from support.robots import PAPER, paper_states
 
 LIMITS = JointLimits(PAPER)
@@ -100,10 +100,3 @@ def test_posture_that_is_not_finite_is_refused():
     q[9] = np.nan
     with pytest.raises(ModelError, match="not finite"):
         ScpController(PAPER, ControllerConfig()).step(q, None, still(np.zeros(17)), 0.0)
-
-
-@pytest.mark.filterwarnings("error")
-def test_singular_posture_is_refused():
-    """All joints straight: the head cannot move sideways, B_tilde has no inverse."""
-    with pytest.raises(SingularError, match="B_tilde"):
-        ScpController(PAPER, ControllerConfig()).step(np.zeros(17), None, still(np.zeros(17)), 0.0)

@@ -69,12 +69,13 @@ def test_a_fall_ends_the_run_a_little_later():
     assert run.summary["duration_s"] == pytest.approx(AFTER_FALL_S)
 
 
-def test_a_singular_posture_ends_the_run_in_words():
+def test_a_start_in_a_singular_posture_ends_the_run_in_words():
     config = load_case((), 3)
     robot = dataclasses.replace(config.robot, start_joint_angles_rad=(0.0,))
     run = run_case(dataclasses.replace(config, robot=robot), SHORT)
-    assert run.summary["ended"].startswith("no answer after 0.00 s: B_tilde")
-    assert len(run.series) == 0
+    # V_b1 of a head without manipulability is beyond what its weight was made for.
+    assert run.summary["ended"].startswith("the motion ran away at 0.02 s")
+    assert len(run.series) == 2
 
 
 def test_perfect_servos_know_no_limits_and_limited_ones_do():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 
 import numpy as np
@@ -25,16 +26,16 @@ def some_angles(robot: RobotConfig, seed: int) -> np.ndarray:
     return np.random.default_rng(seed).uniform(-0.6, 0.6, n_b - 1)
 
 
-def moved(g: PlanarBase, angle: float, shift: np.ndarray) -> PlanarBase:
-    c, s = np.cos(angle), np.sin(angle)
-    turn = np.array([[c, s], [-s, c]])
-    return dataclasses.replace(
-        g,
-        x=g.x @ turn,
-        y=g.y @ turn,
-        centers=g.centers @ turn + shift,
-        hitches=g.hitches @ turn + shift,
-    )
+def with_links(g: PlanarBase, forward: np.ndarray, middles: np.ndarray) -> PlanarBase:
+    """The same with other directions and centres of links, x + i y each."""
+    other = copy.copy(g)
+    other.forward, other.middles = forward, middles
+    return other
+
+
+def moved(g: PlanarBase, angle: float, shift: complex) -> PlanarBase:
+    turn = np.exp(1j * angle)
+    return with_links(g, g.forward * turn, g.middles * turn + shift)
 
 
 @ALL
@@ -71,7 +72,7 @@ def test_place_heading_and_size_do_not_matter(robot):
     angles = some_angles(robot, 3)
     g = base_of(robot, angles)
     expected = singular_shape(g)
-    elsewhere = singular_shape(moved(g, 2.3, np.array([7.0, -4.0])))
+    elsewhere = singular_shape(moved(g, 2.3, 7.0 - 4.0j))
     assert elsewhere.nearness == pytest.approx(expected.nearness, abs=1e-9)
     assert elsewhere.kind is expected.kind
     larger = dataclasses.replace(robot, half_length_m=11 * robot.half_length_m)
@@ -101,13 +102,10 @@ def test_it_is_between_0_and_1():
 def test_wheels_that_resist_all_motions_alike_are_as_far_as_can_be():
     g = base_of(PAPER, some_angles(PAPER, 0))
     around = np.pi / 4 + np.pi / 2 * np.arange(4)
-    out = np.stack((np.cos(around), np.sin(around)), axis=1)
-    wheeled = g.s.wheeled
-    x, y, centers = g.x.copy(), g.y.copy(), g.centers.copy()
-    centers[wheeled] = out
+    forward, middles = g.forward.copy(), g.middles.copy()
+    middles[g.s.wheeled] = np.exp(1j * around)
     # At half a right angle to the spoke, the axes are spread over directions and moments alike.
-    x[wheeled] = (out + np.stack((-out[:, 1], out[:, 0]), axis=1)) / np.sqrt(2)
-    y[wheeled] = np.stack((-x[wheeled, 1], x[wheeled, 0]), axis=1)
-    found = singular_shape(dataclasses.replace(g, x=x, y=y, centers=centers))
+    forward[g.s.wheeled] = np.exp(1j * (around + np.pi / 4))
+    found = singular_shape(with_links(g, forward, middles))
     # Two directions share 4 between them, the moment has 2: trace 6, lambda_min 2.
     assert found.nearness == pytest.approx(0.0, abs=1e-12)

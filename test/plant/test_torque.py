@@ -144,17 +144,23 @@ def test_integration_is_of_fourth_order():
 
 
 def test_falling_is_remembered():
-    plant = TorquePlant(PAPER)
+    plant = TorquePlant(dataclasses.replace(PAPER, link_mass_kg=(0.2,) * 5 + (0.1,) * 7))
     phi = np.array(PAPER.start_joint_angles_rad)
-    assert not plant.reset(phi).fallen
-    # The neck's yaw joints swing the head aside, the others stand as stiff as this holds them.
-    wanted, state = phi.copy(), plant.reset(phi)
+    state = plant.reset(phi)
+    assert not state.fallen
+    # The neck's yaw joint swings the head aside, the others stand as stiff as this holds them.
+    wanted = phi.copy()
     wanted[1] = 2.0
-    for _ in range(400):
-        state = plant.step(8.0 * (wanted - state.phi) - 0.2 * state.phi_dot, 2e-3)
+
+    def hold(q, q_dot, elapsed):
+        return 4.0 * (wanted - q[6:]) - 0.1 * q_dot[6:]
+
+    for _ in range(1600):
+        state = plant.follow(hold, 5e-4)
         if state.fallen:
             break
     assert state.fallen
+    assert np.abs(state.phi).max() < 3.0
     assert not plant.reset(phi).fallen
 
 

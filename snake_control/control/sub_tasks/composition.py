@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from snake_control.config import ControllerConfig, RobotConfig
 from snake_control.control.sub_tasks.catalogue import make
 from snake_control.control.sub_tasks.sub_task import SubTask
 from snake_control.model.posture import Posture
-from snake_control.model.structure import Indices
+from snake_control.model.vector import sumprod
 
 Array = NDArray[np.float64]
 
@@ -53,41 +54,39 @@ class Composition:
         self._head, self._base = head.made(robot, c), base.made(robot, c)
         self._projection = c.scp_law == "projection"
 
-    def velocities(self, posture: Posture, w_dot: Array) -> Array:
+    def velocities(self, posture: Posture, w_dot: ArrayLike) -> Array:
         """Return the wanted SCP velocities, H-SCPs first, (m,) [rad/s].
 
         Args:
             posture: the posture; only what the sub-tasks ask of it is worked out.
             w_dot: velocity of w that the head gets in this step, (6,), or (3,) for a planar snake.
-
-        Raises:
-            SingularError: B_tilde has no inverse.
         """
-        s = posture.k.s
+        k = posture.k
+        s = k.s
+        if self._projection:
+            return self._projected(posture, np.asarray(w_dot, dtype=float).tolist())
         phi_tilde_dot = np.zeros(s.m)
-        if not (self._head or self._base or self._projection):
-            return phi_tilde_dot
-        F_bar = posture.k.F_bar
-        # Columns of F_bar: w, H-SCPs, B-SCPs; rows: theta_bar of the head, then of the base.
-        h = F_bar.shape[1] - s.m
-        b = h + s.m_h
-        head, base = F_bar[: len(s.theta_h)], F_bar[len(s.theta_h) :]
+        if self._head and s.m_h:
+            by_head = _sum(self._head, _by_head, posture, s.n_h).tolist()
+            phi_tilde_dot[: s.m_h] = [sumprod(by_head, motion) for motion in k.head_scp_motion]
+        if self._base and s.m_b:
+            by_base = _sum(self._base, _by_base, posture, s.n_b - 1)
+            phi_tilde_dot[s.m_h :] = by_base.dot(k.base_scp_motion)
+        return phi_tilde_dot
+
+    def _projected(self, posture: Posture, w_dot: list[float]) -> Array:
+        k = posture.k
+        s = k.s
+        phi_tilde_dot = np.zeros(s.m)
         if s.m_h:
-            by_phi = _gradient(self._head, posture)
-            phi_tilde_dot[: s.m_h] = (
-                _projected(by_phi, s.scp_h, s.theta_h, head[:, h:b], head[:, :h] @ w_dot)
-                if self._projection
-                else by_phi[s.scp_h] + by_phi[s.theta_h] @ head[:, h:b]
-            )
+            motion = np.transpose(k.head_scp_motion)
+            without = k.joint_velocities(w_dot, phi_tilde_dot.tolist())[: s.n_h]
+            wanted = _sum(self._head, _by_head, posture, s.n_h) - without
+            phi_tilde_dot[: s.m_h] = np.linalg.lstsq(motion, wanted, rcond=_RCOND)[0]
         if s.m_b:
-            by_phi = _gradient(self._base, posture)
-            if self._projection:
-                by_head = base[:, :h] @ w_dot + base[:, h:b] @ phi_tilde_dot[: s.m_h]
-                phi_tilde_dot[s.m_h :] = _projected(
-                    by_phi, s.scp_b, s.theta_b, base[:, b:], by_head
-                )
-            else:
-                phi_tilde_dot[s.m_h :] = by_phi[s.scp_b] + by_phi[s.theta_b] @ base[:, b:]
+            without = k.joint_velocities(w_dot, phi_tilde_dot.tolist())[s.n_h :]
+            wanted = _sum(self._base, _by_base, posture, s.n_b - 1) - without
+            phi_tilde_dot[s.m_h :] = np.linalg.lstsq(k.base_scp_motion, wanted, rcond=_RCOND)[0]
         return phi_tilde_dot
 
 
@@ -106,25 +105,22 @@ class _Part:
         return tuple((self.gain * w, task) for w, task in weighted if self.gain * w)
 
 
-def _gradient(tasks: _Weighted, posture: Posture) -> Array:
-    """Return the derivative of the weighted sum by phi, (n - 1,)."""
-    total: Array = np.zeros(posture.k.s.n - 1)
+def _by_head(task: SubTask, posture: Posture) -> Array:
+    return task.by_head(posture)
+
+
+def _by_base(task: SubTask, posture: Posture) -> Array:
+    return task.by_base(posture)
+
+
+def _sum(
+    tasks: _Weighted, part: Callable[[SubTask, Posture], Array], posture: Posture, size: int
+) -> Array:
+    """Return the derivative of the weighted sum by the joints of one part, (size,)."""
+    total: Array = np.zeros(size)
     for weight, task in tasks:
-        by_phi = task.gradient(posture)[6:]
-        if np.isfinite(by_phi).all():
-            total += weight * by_phi
+        by_joints = part(task, posture)
+        # The sum of squares is quicker; where it overflows, every component is looked at.
+        if math.isfinite(by_joints.dot(by_joints)) or np.isfinite(by_joints).all():
+            total += weight * by_joints
     return total
-
-
-def _projected(by_phi: Array, scp: Indices, theta: Indices, F: Array, without: Array) -> Array:
-    """Return the SCP velocities that bring all joints of a part closest to ``by_phi``.
-
-    Args:
-        by_phi: joint velocities wanted, (n - 1,) [rad/s].
-        scp, theta: SCPs and other joints of the part.
-        F: velocity of the other joints for each SCP.
-        without: velocity of the other joints with the SCPs still [rad/s].
-    """
-    joints = np.vstack((np.eye(len(scp)), F))
-    wanted = np.concatenate((by_phi[scp], by_phi[theta] - without))
-    return np.asarray(np.linalg.lstsq(joints, wanted, rcond=_RCOND)[0], dtype=float)

@@ -20,3 +20,7 @@ class Fall(SubTask):
     def gradient(self, posture: Posture) -> Array:
         """Return the gradient of d_min."""
         return posture.support.gradient
+
+    def by_base(self, posture: Posture) -> Array:
+        """Return the part of the base joints."""
+        return posture.support.by_base

@@ -24,3 +24,7 @@ class LogSingularity(SubTask):
     def gradient(self, posture: Posture) -> Array:
         """Return the gradient of log V_b1."""
         return posture.log_V_b1_gradient
+
+    def by_base(self, posture: Posture) -> Array:
+        """Return the part of the base joints."""
+        return posture.log_V_b1_by_base

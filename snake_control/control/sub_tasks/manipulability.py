@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from snake_control.control.sub_tasks.sub_task import Array, SubTask
 from snake_control.model.posture import Posture
 
@@ -16,3 +18,7 @@ class Manipulability(SubTask):
     def gradient(self, posture: Posture) -> Array:
         """Return the gradient of V_h, from cofactors: no division by V_h."""
         return posture.V_h_gradient
+
+    def by_head(self, posture: Posture) -> Array:
+        """Return the part of the head joints."""
+        return np.array(posture.V_h_by_head)

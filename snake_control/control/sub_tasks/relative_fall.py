@@ -16,3 +16,7 @@ class RelativeFall(SubTask):
     def gradient(self, posture: Posture) -> Array:
         """Return the gradient of d_min / l."""
         return posture.support.gradient / self.robot.half_length_m
+
+    def by_base(self, posture: Posture) -> Array:
+        """Return the part of the base joints."""
+        return posture.support.by_base / self.robot.half_length_m

@@ -25,3 +25,7 @@ class Singularity(SubTask):
     def gradient(self, posture: Posture) -> Array:
         """Return the gradient of V_b1, as V_b1 times that of its logarithm."""
         return posture.log_V_b1_gradient * math.exp(min(posture.log_V_b1, _LARGEST))
+
+    def by_base(self, posture: Posture) -> Array:
+        """Return the part of the base joints."""
+        return posture.log_V_b1_by_base * math.exp(min(posture.log_V_b1, _LARGEST))

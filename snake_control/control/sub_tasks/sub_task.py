@@ -45,3 +45,14 @@ class SubTask(abc.ABC):
         Of it the composition reads the head joints for ``head_sub_tasks``, the base joints for
         ``base_sub_tasks``.
         """
+
+    def by_head(self, posture: Posture) -> Array:
+        """Return the part of ``gradient`` by phi_1 .. phi_(n_h), (n_h,).
+
+        Worth overriding only where that part alone costs less.
+        """
+        return self.gradient(posture)[6 : 6 + posture.k.s.n_h]
+
+    def by_base(self, posture: Posture) -> Array:
+        """Return the part of ``gradient`` by phi_(n_h+1) .. phi_(n-1), (n_b - 1,); the same."""
+        return self.gradient(posture)[6 + posture.k.s.n_h :]
