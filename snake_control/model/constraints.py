@@ -23,8 +23,12 @@ def lateral_map(g: PlanarBase) -> Array:
         base coordinates.
     """
     wheeled = g.s.wheeled
-    x, y = g.x[wheeled], g.y[wheeled]
-    return np.column_stack((y, np.sum(x * g.centers[wheeled], axis=1)))
+    forward = g.forward[wheeled]
+    rows = np.empty((len(wheeled), 3))
+    rows[:, 0] = -forward.imag
+    rows[:, 1] = forward.real
+    rows[:, 2] = (forward.conj() * g.middles[wheeled]).real
+    return rows
 
 
 def lateral_velocities(g: PlanarBase, base_velocities: Array) -> Array:
@@ -39,10 +43,10 @@ def lateral_velocities(g: PlanarBase, base_velocities: Array) -> Array:
     """
     s = g.s
     turning = np.zeros(s.n_b)
-    base_velocities.cumsum(out=turning[1:])
+    np.add.accumulate(base_velocities, out=turning[1:])
     # A link that turns about its front end moves its rear end sideways.
     front = np.zeros(s.n_b, dtype=complex)
-    (g.links[:-1] * (-1j * turning[:-1])).cumsum(out=front[1:])
+    np.add.accumulate(g.links[:-1] * (-1j * turning[:-1]), out=front[1:])
     velocities: Array = (g.forward.conj() * front).imag - s.robot.half_length_m * turning
     return velocities[s.wheeled]
 

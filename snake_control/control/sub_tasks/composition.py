@@ -65,14 +65,14 @@ class Composition:
         s = k.s
         if self._projection:
             return self._projected(posture, np.asarray(w_dot, dtype=float).tolist())
-        phi_tilde_dot = np.zeros(s.m)
+        head, base = [0.0] * s.m_h, [0.0] * s.m_b
         if self._head and s.m_h:
             by_head = _sum(self._head, _by_head, posture, s.n_h).tolist()
-            phi_tilde_dot[: s.m_h] = [sumprod(by_head, motion) for motion in k.head_scp_motion]
+            head = [sumprod(by_head, motion) for motion in k.head_scp_motion]
         if self._base and s.m_b:
             by_base = _sum(self._base, _by_base, posture, s.n_b - 1)
-            phi_tilde_dot[s.m_h :] = by_base.dot(k.base_scp_motion)
-        return phi_tilde_dot
+            base = by_base.dot(k.base_scp_motion).tolist()
+        return np.array(head + base)
 
     def _projected(self, posture: Posture, w_dot: list[float]) -> Array:
         k = posture.k
@@ -117,10 +117,11 @@ def _sum(
     tasks: _Weighted, part: Callable[[SubTask, Posture], Array], posture: Posture, size: int
 ) -> Array:
     """Return the derivative of the weighted sum by the joints of one part, (size,)."""
-    total: Array = np.zeros(size)
+    total: Array | None = None
     for weight, task in tasks:
         by_joints = part(task, posture)
         # The sum of squares is quicker; where it overflows, every component is looked at.
         if math.isfinite(by_joints.dot(by_joints)) or np.isfinite(by_joints).all():
-            total += weight * by_joints
-    return total
+            weighted = weight * by_joints
+            total = weighted if total is None else total + weighted
+    return np.zeros(size) if total is None else total
