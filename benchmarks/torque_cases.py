@@ -129,9 +129,9 @@ def figures(samples: list[tuple[float, TorquePlantState, TorqueResult]]) -> dict
 
 
 def _push(result: TorqueResult) -> float:
-    """Return the largest torque that 1 m/s^2 of the head in y takes by itself [N m]."""
+    """Return the largest torque that 1 m/s^2 of the head in x takes by itself [N m]."""
     posture = Posture(RobotConfig(), np.concatenate((result.w, result.phi)))
-    return float(np.abs(np.linalg.pinv(posture.k.E_tilde) @ result.M_tilde[:, 1]).max())
+    return float(np.abs(np.linalg.pinv(posture.k.E_tilde) @ result.M_tilde[:, 0]).max())
 
 
 def plot(runs: dict[int, list[tuple[float, TorquePlantState, TorqueResult]]]) -> Figure:
