@@ -102,7 +102,8 @@ def figures(samples: list[tuple[float, TorquePlantState, TorqueResult]]) -> dict
     off = np.abs(error - law).max(axis=1)
     torque = np.abs([r.u for r in results])
     speed = np.abs([s.phi_dot for s in states]).max(axis=1)
-    side = np.abs([s.wheel_forces for s in states]).max(axis=1)
+    # The first state is that of a robot without torques.
+    side = np.abs([s.wheel_forces for s in states[1:]]).max(axis=1)
     V_b1 = np.array([r.V_b1 for r in results])
     late = t >= SETTLED_FROM_S
     fell = [time_s for time_s, state, _ in samples if state.fallen]
@@ -117,7 +118,7 @@ def figures(samples: list[tuple[float, TorquePlantState, TorqueResult]]) -> dict
         "joint_speed_max_settled_rad_s": float(speed[late].max(initial=0.0)),
         "joint_angle_max_rad": float(np.abs([s.phi for s in states]).max()),
         "side_force_max_n": float(side.max()),
-        "side_force_max_settled_n": float(side[late].max(initial=0.0)),
+        "side_force_max_settled_n": float(side[late[1:]].max(initial=0.0)),
         "V_b1_min": float(V_b1.min()),
         "V_b1_below_1_percent_at_s": float(below[0]) if len(below) else None,
         "sigma_min_E_tilde_min": min(r.sigma_min_E_tilde for r in results),
