@@ -22,7 +22,7 @@ BASE_SUB_TASKS: Mapping[str, float] = MappingProxyType(
         "fall": 3.0,
         "relative_fall": 0.3,
         "joint_range": 0.1,
-        "obstacles": 0.1,
+        "obstacles": 0.3,
     }
 )
 """The same of the base."""

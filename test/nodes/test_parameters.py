@@ -105,11 +105,24 @@ def test_sub_tasks_change_while_running_and_their_weights_follow(tmp_path, monke
             assert not result.successful
             assert reason in result.reason
         assert now("base_sub_tasks") == ["fall", "my_sub_tasks:Lazy"]
-        assert change(controller__base_sub_tasks=["none"]).successful
-        assert now("base_weights") == [0.0]
+        both = {"controller__base_sub_tasks": ["fall"], "controller__base_weights": [5.0]}
+        assert graph.set_parameters_atomically(NODE, **both).successful
+        assert (now("base_sub_tasks"), now("base_weights")) == (["fall"], [5.0])
+        both = {"controller__base_sub_tasks": ["wheel_axes", "fal"], "controller__a_b": 2.0}
+        assert not graph.set_parameters_atomically(NODE, **both).successful
+        assert graph.get_parameter(NODE, "controller.a_b") == 1.0
+        # Weights were given now: they no longer follow another list.
+        assert not change(controller__base_sub_tasks=["fall", "joint_range"]).successful
+        both = {"controller__base_sub_tasks": ["fall", "joint_range"]}
+        both["controller__base_weights"] = [4.0, 0.2]
+        assert graph.set_parameters_atomically(NODE, **both).successful
+        assert graph.get_parameter(NODE, "controller.b_prime") == 4.0
+        none = {"controller__base_sub_tasks": ["none"], "controller__base_weights": [0.0]}
+        assert graph.set_parameters_atomically(NODE, **none).successful
+        assert (now("base_sub_tasks"), now("base_weights")) == (["none"], [0.0])
         assert change(controller__obstacles_file=str(obstacles)).successful
-        assert change(controller__base_sub_tasks=["obstacles"]).successful
-        assert now("base_weights") == [0.1]
+        near = {"controller__base_sub_tasks": ["obstacles"], "controller__base_weights": [0.1]}
+        assert graph.set_parameters_atomically(NODE, **near).successful
 
 
 @pytest.mark.parametrize(

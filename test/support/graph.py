@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import IO, Any, NamedTuple, TypeVar
 
 import rclpy
-from rcl_interfaces.srv import GetParameters, SetParameters
+from rcl_interfaces.srv import GetParameters, SetParameters, SetParametersAtomically
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.publisher import Publisher
@@ -231,6 +231,15 @@ class Graph:
             request.parameters.append(parameter.to_parameter_msg())
         service = _Service("~/set_parameters", SetParameters)
         return dict(zip(values, self.call(node_name, service, request).results, strict=True))
+
+    def set_parameters_atomically(self, node_name: str, **values: Any) -> Any:
+        """Set parameters at once, all or none; names as for ``set_parameters``."""
+        request = SetParametersAtomically.Request()
+        for name, value in values.items():
+            parameter = Parameter(name.replace("__", "."), value=value)
+            request.parameters.append(parameter.to_parameter_msg())
+        service = _Service("~/set_parameters_atomically", SetParametersAtomically)
+        return self.call(node_name, service, request).result
 
     def get_parameter(self, node_name: str, name: str) -> Any:
         """Value of a parameter of a node."""

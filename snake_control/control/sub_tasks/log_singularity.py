@@ -12,9 +12,9 @@ class LogSingularity(SubTask):
     The gradient grows as 1 / sigma_min towards a singular posture and is finite in every posture
     that numbers can hold; where V_b1 is exactly 0 (V = -inf) it is 0.
 
-    On its own it does not keep the paper's robot from turning singular: V_b1 also counts how much
-    the constraints amplify motions along the body, and rises while the body folds up.
-    ``WheelAxes`` looks at the singular shapes alone.
+    It does not reliably keep a robot from turning singular: V_b1 also counts how much motions grow
+    along the body, and may rise while the body folds up (docs/sub_tasks.md). ``WheelAxes`` looks at
+    the singular shapes alone.
     """
 
     def value(self, posture: Posture) -> float:
