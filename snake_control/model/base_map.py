@@ -4,13 +4,16 @@ The wheels of a driven link decide the joint in front of it, so the motion of th
 follows from that of its first link and from the B-SCPs. This matrix N is all of F_bar that belongs
 to base joints, and with it V_b1. All here is in the plane of the base; link k turns with joint k in
 front of it, counted from 0, and the first link counts as one that turns about its own front end.
+
+Substitution is BLAS's ``trsm``. LAPACK's ``trtrs`` does the same, but OpenBLAS gives it to all
+cores however little there is to do, and then waits for them.
 """
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import lapack
+from scipy.linalg import blas
 
 from snake_control.model.geometry import PlanarBase, in_plane
 
@@ -26,7 +29,6 @@ class BaseMap:
         N: the same without row 0, (n_b - 1, 2 + m_b). The rows of B-SCPs are unit vectors.
     """
 
-    turns: Array
     N: Array
 
     def __init__(self, g: PlanarBase) -> None:
@@ -50,7 +52,7 @@ class BaseMap:
         right[0] += self._rightward.real
         right[1] += self._rightward.imag
         # Substitution keeps every row to full precision, however fast rows grow along the body.
-        self.turns, _ = lapack.dtrtrs(self._arms, right.T, trans=1, overwrite_b=1)
+        self.turns: Array = blas.dtrsm(1.0, self._arms, right.T, trans_a=1, overwrite_b=1)
         self.N = self.turns[1:]
 
     def gradient(self, weights: Array) -> Array:
@@ -67,7 +69,7 @@ class BaseMap:
         Returns:
             Shape (n_b - 1,).
         """
-        adjoint, _ = lapack.dtrtrs(self._arms[1:, 1:], weights)
+        adjoint = blas.dtrsm(1.0, self._arms[1:, 1:], weights)
         # Forces across the driven links (times l, to the right), and all of those behind a joint.
         force = self._rightward[1:, None] * adjoint
         behind = np.add.accumulate(force[::-1])[::-1]

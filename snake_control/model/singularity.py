@@ -17,7 +17,7 @@ import math
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import lapack
+from scipy.linalg import blas, lapack
 
 from snake_control.model.damping import EPSILON, damped_reciprocals
 from snake_control.model.geometry import Geometry
@@ -46,9 +46,10 @@ class GramDeterminant:
     def transposed_pseudo_inverse(self) -> Array:
         """Return (N^+)^T, half the derivative of ``log`` by N; damped near a singular posture."""
         Q, _, _ = lapack.dorgqr(self._qr, self._tau)
-        inverse, zero_on_diagonal = lapack.dtrtrs(self._qr[: len(Q.T)], Q.T)
-        # While this bound holds, no singular value lies below the threshold.
-        if not zero_on_diagonal and np.vdot(inverse, inverse) < EPSILON**-2:
+        inverse: Array = blas.dtrsm(1.0, self._qr[: len(Q.T)], Q.T)
+        # While this bound holds, no singular value lies below the threshold. It does not hold for
+        # what a zero on the diagonal leaves.
+        if np.vdot(inverse, inverse) < EPSILON**-2:
             return inverse.T
         U, sigma, Vt = np.linalg.svd(self._N, full_matrices=False)
         return (U * damped_reciprocals(sigma)) @ Vt

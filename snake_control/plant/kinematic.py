@@ -82,11 +82,10 @@ class KinematicPlant:
         links = planar_base(self._s, phi[n_h:])
         rows = lateral_map(links)
         by_joints = lateral_velocities(links, phi_dot[n_h:])
-        twist = _least_squares(rows, -by_joints)
-        x, y, turn = twist.tolist()
+        x, y, turn = _least_squares(rows, -by_joints)
         c, si = math.cos(base[2]), math.sin(base[2])
         rate = np.array((c * x - si * y, si * x + c * y, turn))
-        return rate, rows.dot(twist) + by_joints
+        return rate, rows.dot((x, y, turn)) + by_joints
 
     def _state(self, planar: Array, phi_dot: Array, slip: Array) -> PlantState:
         chain = head_chain(self._s, self._phi[: self._s.n_h].tolist())
@@ -112,11 +111,16 @@ class KinematicPlant:
         return array
 
 
-def _least_squares(rows: Array, right: Array) -> Array:
+def _least_squares(rows: Array, right: Array) -> tuple[float, float, float]:
     """Solve for three numbers; of several answers (a singular shape) the smallest."""
-    factors, solution, _ = lapack.dgels(rows, right)
-    diagonal = np.abs(factors.diagonal())
-    if len(rows) >= 3 and diagonal.min() > _FULL_RANK * diagonal.max():
-        found: Array = solution[:3]
-        return found
-    return np.linalg.lstsq(rows, right, rcond=1e-9)[0].astype(float)
+    if len(rows) > 3:
+        # The triangular factor of rows and right side together holds what is to be solved.
+        factor, _, _, _ = lapack.dgeqrf(np.concatenate((rows, right[:, None]), axis=1))
+        R = factor[:3].tolist()
+        diagonal = [abs(R[i][i]) for i in range(3)]
+        if min(diagonal) > _FULL_RANK * max(diagonal):
+            z = R[2][3] / R[2][2]
+            y = (R[1][3] - R[1][2] * z) / R[1][1]
+            return (R[0][3] - R[0][1] * y - R[0][2] * z) / R[0][0], y, z
+    x, y, z = np.linalg.lstsq(rows, right, rcond=1e-9)[0].tolist()
+    return x, y, z
