@@ -6,7 +6,7 @@ from setuptools import find_packages, setup
 
 NAME = "snake_control"
 NODES = ("bus_driver", "pose_input", "scp_controller", "trajectory_generator", "mock_bus")
-COMMANDS = ("demo", "evaluate", "experiment")
+COMMANDS = ("demo", "evaluate", "experiment", "scp_study")
 
 setup(
     name=NAME,

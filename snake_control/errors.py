@@ -7,6 +7,20 @@ Subclasses carry their data and also derive from the built-in that a caller woul
 class SnakeError(Exception):
     """Base of all errors raised on purpose by snake_control."""
 
+    def __reduce__(self) -> tuple[object, ...]:
+        # Errors that make their text of several arguments must pass between processes, too; Python
+        # would call them with the text alone.
+        return _restored, (type(self), self.__dict__, self.args)
+
+
+def _restored(
+    cls: type[SnakeError], state: dict[str, object], args: tuple[object, ...]
+) -> SnakeError:
+    error = cls.__new__(cls)
+    error.args = args
+    error.__dict__.update(state)
+    return error
+
 
 class ConfigError(SnakeError, ValueError):
     """A configuration value that is missing, of the wrong type, or not allowed.
@@ -68,6 +82,10 @@ class ServoError(SnakeError, RuntimeError):
     def __init__(self, findings: list[str]) -> None:
         self.findings = list(findings)
         super().__init__("; ".join(findings))
+
+
+class StudyError(SnakeError, RuntimeError):
+    """A study of SCP choices that cannot be run or continued."""
 
 
 class SeriesFileError(SnakeError, ValueError):

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
-import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from snake_control.cli.checked import natural, positive
 from snake_control.config import Config, load
 from snake_control.experiment.cases import CASES, case_files, config_directory
 from snake_control.experiment.parameters import configuration_parameters
@@ -97,10 +97,10 @@ def parse_arguments(argv: Sequence[str] | None = None) -> DemoArguments:
     )
     parser.add_argument("--case", type=int, choices=CASES, default=3, help="default: %(default)s")
     parser.add_argument(
-        "--duration", type=_positive, default=60.0, metavar="S", help="default: %(default)s s"
+        "--duration", type=positive, default=60.0, metavar="S", help="default: %(default)s s"
     )
     parser.add_argument(
-        "--seed", type=_natural, metavar="N", help="of the mock's noise; default: its configuration"
+        "--seed", type=natural, metavar="N", help="of the mock's noise; default: its configuration"
     )
     parser.add_argument("--out", type=Path, default=Path("out/demo"), metavar="DIR")
     parser.add_argument(
@@ -123,17 +123,3 @@ def parse_arguments(argv: Sequence[str] | None = None) -> DemoArguments:
         params_files=tuple(given.params_file),
         no_noise=given.no_noise,
     )
-
-
-def _positive(text: str) -> float:
-    value = float(text)
-    if not (math.isfinite(value) and value > 0):
-        raise argparse.ArgumentTypeError(f"{text} is not more than 0")
-    return value
-
-
-def _natural(text: str) -> int:
-    value = int(text)
-    if value < 0:
-        raise argparse.ArgumentTypeError(f"{text} is negative")
-    return value

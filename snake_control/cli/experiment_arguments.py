@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
-import math
 from collections.abc import Sequence
 from pathlib import Path
 
+from snake_control.cli.checked import positive
 from snake_control.config import Config
 from snake_control.experiment.cases import CASES, load_case
 from snake_control.experiment.run import CONTROLLERS, SERVOS, TORQUE_RATE_HZ, Settings
@@ -118,7 +118,7 @@ def parse_arguments(argv: Sequence[str] | None = None) -> ExperimentArguments:
         help="1, 2, 3, several as 1,3, or all (side by side); default: the files' own",
     )
     parser.add_argument(
-        "--duration", type=_positive, default=60.0, metavar="S", help="default: %(default)s s"
+        "--duration", type=positive, default=60.0, metavar="S", help="default: %(default)s s"
     )
     parser.add_argument("--out", type=Path, default=Path("out/experiment"), metavar="DIR")
     parser.add_argument(
@@ -150,7 +150,7 @@ def parse_arguments(argv: Sequence[str] | None = None) -> ExperimentArguments:
     )
     parser.add_argument(
         "--plant-step",
-        type=_positive,
+        type=positive,
         default=Settings().plant_step_s,
         metavar="S",
         help="longest step of the body without inertia; default: %(default)s s",
@@ -195,13 +195,6 @@ def _cases(text: str) -> tuple[int, ...]:
     if not cases or not set(cases) <= set(CASES):
         raise argparse.ArgumentTypeError(f"{text!r} is not 1, 2, 3, a list like 1,3, or all")
     return tuple(cases)
-
-
-def _positive(text: str) -> float:
-    value = float(text)
-    if not (math.isfinite(value) and value > 0):
-        raise argparse.ArgumentTypeError(f"{text} is not more than 0")
-    return value
 
 
 def _rate(text: str) -> float:

@@ -1,0 +1,144 @@
+"""The study as people call it: in parallel, killed and continued, and on a Dask cluster."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from support.process import Process
+from support.waiting import wait_for
+
+ROOT = Path(__file__).parents[2]
+SHORT = ("--duration", "0.4", "--sample", "4")
+
+
+def command(out: Path, *arguments: str) -> list[str]:
+    return [sys.executable, "-m", "snake_control.cli.scp_study", "--out", str(out), *arguments]
+
+
+def run(out: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        command(out, *arguments), cwd=ROOT, capture_output=True, text=True, timeout=100, check=False
+    )
+
+
+def test_a_short_study_leaves_its_results_and_does_nothing_twice(tmp_path):
+    done = run(tmp_path, *SHORT)
+    assert done.returncode == 0, done.stderr
+    assert "The configured choice (links 7, 9, 11; phi 3)" in done.stdout
+    assert (tmp_path / "ranking.png").stat().st_size > 10_000
+    rows = (tmp_path / "ranking.csv").read_text().splitlines()
+    outcomes = (tmp_path / "outcomes.jsonl").read_text()
+    assert len(outcomes.splitlines()) == 3 * (len(rows) - 1)
+    again = run(tmp_path, *SHORT)
+    assert "12 of them done before" in again.stdout or "15 of them done before" in again.stdout
+    assert (tmp_path / "outcomes.jsonl").read_text() == outcomes
+    assert (tmp_path / "ranking.csv").read_text().splitlines() == rows
+
+
+def test_killed_half_way_it_goes_on(tmp_path):
+    arguments = ("--duration", "2", "--sample", "12", "--workers", "2")
+    process = Process(
+        "scp_study",
+        command(tmp_path, *arguments),
+        log=tmp_path / "log.txt",
+        cwd=ROOT,
+        environment=os.environ,
+    )
+    store = tmp_path / "outcomes.jsonl"
+
+    def some() -> int:
+        return len(store.read_text().splitlines()) if store.exists() else 0
+
+    wait_for(lambda: some() >= 3 or not process.running, 60.0, "the first outcomes")
+    workers = _children(process.pid)
+    process.kill()
+    process.wait()
+    wait_for(lambda: not any(map(_alive, workers)), 20.0, "the end of the workers")
+    kept = some()
+    done = run(tmp_path, *arguments)
+    assert done.returncode == 0, done.stderr
+    assert f"{kept} of them done before" in done.stdout
+    assert len({line[:40] for line in store.read_text().splitlines()}) == some()
+
+
+def test_ctrl_c_keeps_what_was_done(tmp_path):
+    process = Process(
+        "scp_study",
+        command(tmp_path, "--duration", "60", "--workers", "1"),
+        log=tmp_path / "log.txt",
+        cwd=ROOT,
+        environment=os.environ,
+    )
+    store = tmp_path / "outcomes.jsonl"
+    wait_for(
+        lambda: (store.exists() and store.read_text()) or not process.running, 60.0, "an outcome"
+    )
+    os.kill(process.pid, signal.SIGINT)
+    assert process.wait(60.0) == 130, process.report()
+    assert "goes on from here" in process.output()
+    assert "Traceback" not in process.output()
+
+
+def test_on_a_dask_cluster(tmp_path):
+    distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(
+        n_workers=1,
+        threads_per_worker=1,
+        processes=False,
+        protocol="tcp",
+        host="127.0.0.1",
+        dashboard_address=None,
+    ) as cluster:
+        done = run(tmp_path / "dask", *SHORT, "--scheduler", cluster.scheduler_address)
+    assert done.returncode == 0, done.stderr
+    here = run(tmp_path / "here", *SHORT)
+    assert here.returncode == 0, here.stderr
+    ranking = [(tmp_path / name / "ranking.csv").read_text() for name in ("dask", "here")]
+    assert ranking[0] == ranking[1]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--params-file", "nowhere.yaml"), "nowhere.yaml: cannot be read"),
+        (("--trajectories", "nowhere.yaml"), "nowhere.yaml: cannot be read"),
+    ],
+)
+def test_a_mistake_gets_one_line_and_code_2(tmp_path, arguments, words):
+    done = run(tmp_path, *arguments)
+    assert done.returncode == 2
+    assert words in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+
+
+def test_a_scheduler_that_is_not_there_is_named(tmp_path):
+    pytest.importorskip("distributed")
+    done = run(tmp_path, *SHORT, "--scheduler", "tcp://127.0.0.1:9")
+    assert done.returncode == 1
+    assert "no Dask scheduler answers at tcp://127.0.0.1:9" in done.stderr
+
+
+def _children(pid: int) -> list[int]:
+    found = []
+    for entry in Path("/proc").iterdir():
+        if entry.name.isdigit():
+            try:
+                stat = (entry / "stat").read_text()
+            except OSError:
+                continue
+            if int(stat.rpartition(")")[2].split()[1]) == pid:
+                found.append(int(entry.name))
+    return found
+
+
+def _alive(pid: int) -> bool:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False

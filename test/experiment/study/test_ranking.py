@@ -1,0 +1,96 @@
+"""The ranking puts safety first and weighs the rest by places."""
+
+import csv
+import math
+
+import pytest
+
+from snake_control.experiment.study.candidates import Candidate
+from snake_control.experiment.study.figure import draw
+from snake_control.experiment.study.ranking import (
+    format_ranking,
+    ranking,
+    verdict,
+    write_csv,
+)
+from snake_control.experiment.study.trial import Outcome
+
+A, B, C, D = (Candidate((link,), (3,)) for link in (7, 8, 9, 10))
+
+
+def outcome(candidate, trajectory="line", **changes):
+    fields = {
+        "fell_at_s": None,
+        "position_error_rms_m": 0.001,
+        "rotation_error_rms_rad": 0.01,
+        "worst_singularity": 0.5,
+        "min_d_min_m": 0.02,
+        "peak_speed_rad_s": 1.0,
+        "range_steps": 0.0,
+    }
+    return Outcome(candidate=candidate, trajectory=trajectory, **(fields | changes))
+
+
+def order(outcomes):
+    return [row.candidate for row in ranking(outcomes)]
+
+
+def test_a_fall_is_worse_than_anything_and_a_lost_reference_comes_next():
+    outcomes = [
+        outcome(A, fell_at_s=30.0, position_error_rms_m=math.inf, min_d_min_m=-0.001),
+        outcome(B, position_error_rms_m=0.05),
+        outcome(C, position_error_rms_m=0.019, worst_singularity=0.9, peak_speed_rad_s=5.0),
+        outcome(D),
+    ]
+    assert order(outcomes) == [D, C, B, A]
+    rows = ranking(outcomes)
+    assert [(row.falls, row.lost) for row in rows] == [(0, 0), (0, 0), (0, 1), (1, 0)]
+    assert [row.rank for row in rows] == [1, 2, 3, 4]
+
+
+def test_the_worst_trajectory_counts():
+    outcomes = [
+        outcome(A, "line"),
+        outcome(A, "arc", worst_singularity=0.95, min_d_min_m=0.001, position_error_rms_m=0.01),
+        outcome(B, "line", worst_singularity=0.6),
+        outcome(B, "arc", worst_singularity=0.6),
+    ]
+    assert order(outcomes) == [B, A]
+    worst = ranking(outcomes)[1]
+    assert (worst.worst_singularity, worst.min_d_min_m) == (0.95, 0.001)
+    assert worst.position_error_rms_m == 0.01
+
+
+def test_units_do_not_matter_equal_values_share_their_place():
+    outcomes = [
+        outcome(A, peak_speed_rad_s=3.0),
+        outcome(B, peak_speed_rad_s=300.0),
+        outcome(C, peak_speed_rad_s=2.0),
+    ]
+    rows = ranking(outcomes)
+    assert [row.candidate for row in rows] == [C, A, B]
+    # Three equal places of 2 and one of its own, 1 to 3.
+    assert [row.mean_place for row in rows] == pytest.approx([7 / 4, 8 / 4, 9 / 4])
+
+
+def test_verdict_and_table_name_the_robot_s_own_choice():
+    outcomes = [outcome(c, peak_speed_rad_s=1.0 + i) for i, c in enumerate((A, B, C, D))]
+    rows = ranking(outcomes)
+    assert "ranks 3 of 4" in verdict(rows, C)
+    assert "4 of 4 choices neither fell" in verdict(rows, C)
+    assert "it is the best" in verdict(rows, A)
+    assert "not among those tried" in verdict(rows, Candidate((11,), (3,)))
+    table = format_ranking(rows, D, most=2).splitlines()
+    assert [line.split()[0] for line in table[2:]] == ["1", "2", "..", "4*"]
+    assert all(len(line) <= 79 for line in table)
+
+
+def test_csv_holds_every_row(tmp_path):
+    rows = ranking([outcome(A), outcome(B, fell_at_s=3.0)])
+    write_csv(rows, tmp_path / "r.csv")
+    with (tmp_path / "r.csv").open() as stream:
+        read = list(csv.DictReader(stream))
+    assert [row["wheelless_links"] for row in read] == ["7", "8"]
+    assert [int(row["falls"]) for row in read] == [0, 1]
+    draw(rows, A, tmp_path / "r.png")
+    assert (tmp_path / "r.png").read_bytes().startswith(b"\x89PNG")
