@@ -18,19 +18,13 @@ from snake_control.config import ControllerConfig, RobotConfig
 from snake_control.control.reference import Reference
 from snake_control.control.sub_tasks import Composition
 from snake_control.errors import ModelError, SingularError
+from snake_control.model.damping import EPSILON, damped_reciprocals
 from snake_control.model.dynamics import Dynamics
 from snake_control.model.posture import Posture
 from snake_control.model.rotation import wrap
 from snake_control.model.structure import structure
 
 Array = NDArray[np.float64]
-
-SIGMA_FULL = 1e-3
-"""The pseudo-inverse takes 1 / sigma of singular values of E_tilde down to here, less below.
-
-Below it is sigma / SIGMA_FULL^2: continuous, at most 1 / SIGMA_FULL, 0 where E_tilde loses rank.
-The paper's robot keeps 0.016 or more for 60 s of Cases 1-3, so its error equation is not touched.
-"""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -152,7 +146,7 @@ class TorqueController:
         if not np.isfinite(wanted).all():
             raise SingularError("B_tilde", posture.k.sigma_min_B_tilde)
         U, sigma, Vt = np.linalg.svd(reduced.E_tilde, full_matrices=False)
-        tau = ((U.T @ wanted) * sigma / np.maximum(sigma, SIGMA_FULL) ** 2) @ Vt
+        tau = ((U.T @ wanted) * damped_reciprocals(sigma)) @ Vt
         tau_ker = np.zeros(s.n - 1)
         if free_torques is not None:
             free = self._checked(free_torques)
@@ -175,7 +169,7 @@ class TorqueController:
             tau_ker=tau_ker,
             u=u,
             torque_exceeded=tuple(int(j) + 1 for j in np.flatnonzero(np.abs(u) > self._limits)),
-            damped=bool(sigma[-1] < SIGMA_FULL),
+            damped=bool(sigma[-1] < EPSILON),
             sigma_min_E_tilde=float(sigma[-1]),
             V_h=posture.V_h,
             V_b1=posture.V_b1,

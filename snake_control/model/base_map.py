@@ -55,6 +55,18 @@ class BaseMap:
         self.turns: Array = blas.dtrsm(1.0, self._arms, right.T, trans_a=1, overwrite_b=1)
         self.N = self.turns[1:]
 
+    def answer(self, sideways: Array) -> Array:
+        """Return the velocities of joints that cancel what moves links sideways, (n_b - 1,).
+
+        Or accelerations that cancel accelerations. Those of B-SCPs are 0.
+
+        Args:
+            sideways: speed of each base link to its left, (n_b,) [m/s]; only those of driven links
+                count.
+        """
+        found, _ = lapack.dtrtrs(self._arms, sideways * -self._g.s.base.driven[:, 0], trans=1)
+        return found[1:]
+
     def gradient(self, weights: Array) -> Array:
         """Return the gradient of sum(weights * N) by the base joint angles, weights held constant.
 

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from snake_control.config import RobotConfig
 from snake_control.errors import ModelError
-from snake_control.model.constraint_rates import F_bar_drift
+from snake_control.model.constraint_drift import F_bar_drift
 from snake_control.model.floor import GRAVITY_M_S2
 from snake_control.model.posture import Posture
 from snake_control.model.selection import selection
@@ -93,12 +93,16 @@ class Dynamics:
         self._model.gravity = pinocchio.Motion(np.array([0, 0, -GRAVITY_M_S2, 0, 0, 0]))
         self._data = self._model.createData()
         s = structure(robot)
-        self._S, self._S_bar = selection(s)
+        index = selection(s)
+        self._S, self._S_bar = index.S, index.S_bar
         self._size = s.n + 5
         self._planar = robot.planar
         self._floor_height = robot.wheel_radius_m
         # Pinocchio's root joint counts x, y, z, Y, P, R. The permutation is its own inverse.
         self._order = np.array([0, 1, 2, 5, 4, 3, *range(6, self._size)])
+        self._theta_bar = self._order[self._S_bar]
+        self._motions = np.zeros((self._size, len(self._S) + 1))
+        self._motions[self._order[self._S], np.arange(len(self._S))] = 1.0
         friction = np.zeros(self._size)
         friction[6:] = robot.joint_friction
         self._friction = friction
@@ -149,24 +153,20 @@ class Dynamics:
         Raises:
             ModelError: q_dot has the wrong shape or is not finite.
         """
-        q, q_dot = self._on_floor(posture.g.q, self._checked("q_dot", q_dot))
-        order = self._order
-        drift = F_bar_drift(posture.g, posture.k, q_dot)
-        # Rows of T [I; F_bar] (18) and T [0; F_bar_dot] w_tilde_dot (19), in Pinocchio's order.
-        motions = np.zeros((self._size, len(self._S) + 1))
-        motions[self._S, np.arange(len(self._S))] = 1.0
-        motions[self._S_bar, :-1] = posture.k.F_bar
-        motions[self._S_bar, -1] = drift
-        motions = motions[order]
-        N = motions[:, :-1]
-        forces = pinocchio.nonLinearEffects(self._model, self._data, q[order], q_dot[order])
-        forces = forces + self._friction * q_dot
-        M = pinocchio.crba(self._model, self._data, q[order])
-        momenta = M @ motions
-        reduced = N.T @ momenta
+        q, v = self._on_floor(posture.g.q, self._checked("q_dot", q_dot))
+        drift = F_bar_drift(posture.g, posture.k, v)
+        # T [I; F_bar] (18) and beside it T [0; F_bar_dot] w_tilde_dot (19), in Pinocchio's order.
+        motions = self._motions.copy()
+        motions[self._theta_bar, :-1] = posture.k.F_bar
+        motions[self._theta_bar, -1] = drift
+        q, v = q[self._order], v[self._order]
+        momenta: Array = pinocchio.crba(self._model, self._data, q).dot(motions)
+        forces: Array = pinocchio.nonLinearEffects(self._model, self._data, q, v)
+        momenta[:, -1] += forces + self._friction * v
+        reduced = motions[:, :-1].T.dot(momenta)
         return ReducedDynamics(
             M_tilde=reduced[:, :-1],
-            h_tilde=reduced[:, -1] + N.T @ forces,
+            h_tilde=reduced[:, -1],
             E_tilde=posture.k.E_tilde,
             F_bar_drift=drift,
         )

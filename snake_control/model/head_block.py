@@ -11,6 +11,7 @@ import math
 from collections.abc import Iterable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from snake_control.model.damping import EPSILON, damped_reciprocals, damping_of
 from snake_control.model.geometry import Geometry
@@ -22,6 +23,8 @@ from snake_control.model.vector import (
     adjugate,
     dot,
 )
+
+Array = NDArray[np.float64]
 
 
 class HeadBlock:
@@ -79,6 +82,19 @@ class HeadBlock:
             )
             for (vx, vy, vz), (wx, wy, wz) in twists
         ]
+
+    def rows(self) -> Array:
+        """Return what ``measure`` says of each component of a twist, (4, 6)."""
+        row_x, row_y, (cx, cy, cz) = self._g.rows
+        half = self._g.s.robot.half_length_m
+        return np.array(
+            (
+                (0.0, 1.0 / half, 0.0, 0.0, 0.0, -1.0),
+                (cx / half, cy / half, cz / half, 0.0, cz, -cy),
+                (0.0, 0.0, 0.0, *row_x),
+                (0.0, 0.0, 0.0, *row_y),
+            )
+        )
 
     def answer(self, measured: Four) -> list[float]:
         """Return the velocities of theta_bar's head joints that cancel what was measured."""

@@ -15,6 +15,7 @@ from snake_control.model.constraints import constraint_matrix
 from snake_control.model.geometry import Geometry
 from snake_control.model.head_block import HeadBlock
 from snake_control.model.lazy import lazy
+from snake_control.model.selection import selection
 from snake_control.model.structure import Structure
 from snake_control.model.vector import Twist, along, combine, cross
 
@@ -127,21 +128,17 @@ class Kinematics:
 
         The zero block of (10) is exact. Damped near a singular head posture, see ``damping``.
         """
-        s, entries = self.s, self.s.base.entries
-        head, moved_by_head = len(s.theta_h), len(s.w) + s.m_h
-        inputs = np.concatenate((s.w, 6 + s.scp_h))
+        s, entries, index = self.s, self.s.base.entries, selection(self.s)
+        head, moved_by_head = len(s.theta_h), len(index.head_inputs)
         twists = self._g.twists
-        entry = s.base.entry_rows.dot(twists)
-        by_base = self.base.N[s.theta_b - s.n_h]
+        by_base = self.base.N[index.base_theta]
         F_bar = np.zeros((len(s.theta), moved_by_head + s.m_b))
-        by_entry = entry[:, inputs]
+        moved = twists[:, index.head_inputs]
         if head:
-            columns = twists[:, inputs].T.tolist()
-            measured = self.head.measure([(tuple(c[:3]), tuple(c[3:])) for c in columns])
-            F_head = np.transpose([self.head.answer(value) for value in measured])
+            F_head = -np.array(self.head.inverse).dot(self.head.rows()).dot(moved)
             F_bar[:head, :moved_by_head] = F_head
-            by_entry = by_entry + entry[:, 6 + s.theta_h].dot(F_head)
-        F_bar[head:, :moved_by_head] = by_base[:, :entries].dot(by_entry)
+            moved += twists[:, index.head_theta].dot(F_head)
+        F_bar[head:, :moved_by_head] = by_base[:, :entries].dot(s.base.entry_rows.dot(moved))
         F_bar[head:, moved_by_head:] = by_base[:, entries:]
         return F_bar
 

@@ -27,7 +27,8 @@ ALL = pytest.mark.parametrize("robot", list(ROBOTS.values()), ids=list(ROBOTS))
 def consistent(robot, seed):
     """A posture and a velocity that keeps the constraints there."""
     posture = Posture(robot, random_q(robot, seed))
-    S, S_bar = selection(posture.g.s)
+    index = selection(posture.g.s)
+    S, S_bar = index.S, index.S_bar
     w_tilde_dot = np.random.default_rng(seed).uniform(-1, 1, len(S))
     q_dot = np.zeros(robot.links + 5)
     q_dot[S] = w_tilde_dot
@@ -66,14 +67,16 @@ def test_friction_is_viscous_and_the_joints_own():
     np.testing.assert_allclose(difference[:6], 0.0, atol=1e-14)
     posture = Posture(robot, q)
     reduced = [Dynamics(r).reduced(posture, q_dot).h_tilde for r in (robot, PAPER)]
-    S, S_bar = selection(posture.g.s)
+    index = selection(posture.g.s)
+    S, S_bar = index.S, index.S_bar
     expected = difference[S] + posture.k.F_bar.T @ difference[S_bar]
     np.testing.assert_allclose(reduced[0] - reduced[1], expected, atol=1e-12)
 
 
 @ALL
 def test_selections_make_a_permutation(robot):
-    S, S_bar = selection(Posture(robot, random_q(robot, 1)).g.s)
+    index = selection(Posture(robot, random_q(robot, 1)).g.s)
+    S, S_bar = index.S, index.S_bar
     T = np.concatenate((S, S_bar))
     expected = [*robot.controlled, *range(6, robot.links + 5)]
     np.testing.assert_array_equal(np.sort(T), expected)
@@ -86,7 +89,8 @@ def test_accelerations_are_those_with_the_constraint_forces(robot):
     posture, q_dot = consistent(robot, 6)
     dynamics = Dynamics(robot)
     full, reduced = dynamics.full(posture.g.q, q_dot), dynamics.reduced(posture, q_dot)
-    S, S_bar = selection(posture.g.s)
+    index = selection(posture.g.s)
+    S, S_bar = index.S, index.S_bar
     tau = np.random.default_rng(6).uniform(-0.5, 0.5, robot.joints)
     G = posture.k.G
     rows, size = G.shape
@@ -112,7 +116,7 @@ def test_accelerations_are_those_with_the_constraint_forces(robot):
 def test_power_balance(robot):
     """The kinetic energy of (20) changes by what h_tilde says, up to the power of gravity."""
     posture, q_dot = consistent(robot, 7)
-    S, _ = selection(posture.g.s)
+    S = selection(posture.g.s).S
     w_tilde_dot = q_dot[S]
     dynamics = Dynamics(robot)
 
@@ -132,7 +136,8 @@ def test_bar_and_tilde_agree(robot):
     posture, q_dot = consistent(robot, 8)
     dynamics = Dynamics(robot)
     bar, reduced = dynamics.bar(posture, q_dot), dynamics.reduced(posture, q_dot)
-    S, S_bar = selection(posture.g.s)
+    index = selection(posture.g.s)
+    S, S_bar = index.S, index.S_bar
     M_tilde = bar.M_bar[:, S] + bar.M_bar[:, S_bar] @ posture.k.F_bar
     h_tilde = bar.h_bar + bar.M_bar[:, S_bar] @ reduced.F_bar_drift
     np.testing.assert_allclose(reduced.M_tilde, M_tilde, atol=1e-12 * np.abs(M_tilde).max())
@@ -140,6 +145,14 @@ def test_bar_and_tilde_agree(robot):
     np.testing.assert_array_equal(bar.E_bar, reduced.E_tilde)
     np.testing.assert_allclose(reduced.M_tilde, reduced.M_tilde.T, atol=1e-12)
     assert np.linalg.eigvalsh(reduced.M_tilde)[0] > 0
+
+
+def test_singular_head_postures_give_finite_numbers():
+    """With a straight neck B_tilde has no inverse; F_bar is damped, and all that follows."""
+    posture = Posture(PAPER, np.zeros(17))
+    reduced = Dynamics(PAPER).reduced(posture, np.ones(17))
+    for value in (reduced.M_tilde, reduced.h_tilde, reduced.E_tilde, reduced.F_bar_drift):
+        assert np.isfinite(value).all()
 
 
 def test_planar_snakes_ignore_what_they_have_no_coordinate_for():

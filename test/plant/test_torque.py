@@ -60,7 +60,7 @@ def test_it_moves_as_the_reduced_dynamics_say(robot):
     plant, _, tau = moving(robot, 5)
     dynamics = Dynamics(robot)
     s = Posture(robot, np.zeros(robot.links + 5)).g.s
-    S, _ = selection(s)
+    S = selection(s).S
     for _ in range(10):
         state = plant.step(tau, 0.01)
         q, q_dot = (
