@@ -64,7 +64,8 @@ class BaseMap:
             sideways: speed of each base link to its left, (n_b,) [m/s]; only those of driven links
                 count.
         """
-        found, _ = lapack.dtrtrs(self._arms, sideways * -self._g.s.base.driven[:, 0], trans=1)
+        right = sideways * -self._g.s.base.driven[:, 0]
+        found: Array = blas.dtrsv(self._arms, right, trans=1, overwrite_x=1)
         return found[1:]
 
     def gradient(self, weights: Array) -> Array:
