@@ -14,7 +14,12 @@ from snake_control.experiment import style
 from snake_control.experiment.study.candidates import Candidate
 from snake_control.experiment.study.ranking import Ranked
 
-_COLORS = {"stood and followed": style.BLUE, "lost": style.ORANGE, "fell": style.VERMILION}
+_COLORS = {
+    "stood and followed": style.BLUE,
+    "came near a singular shape": style.PURPLE,
+    "lost its reference": style.ORANGE,
+    "fell": style.VERMILION,
+}
 
 
 def draw(rows: Sequence[Ranked], chosen: Candidate, path: Path) -> None:
@@ -28,6 +33,9 @@ def draw(rows: Sequence[Ranked], chosen: Candidate, path: Path) -> None:
         figure.suptitle(f"Choice of SCPs: {len(rows)} robots, the worst of all trajectories")
         left, right = figure.subplots(1, 2, sharey=True)
         tracking = np.array([1e3 * row.position_error_rms_m for row in rows])
+        # A robot that fell before the last third has no error; it belongs to the worst.
+        worst = tracking[np.isfinite(tracking)].max(initial=1.0)
+        tracking = np.where(np.isfinite(tracking), tracking, worst)
         d_min = np.array([1e3 * row.min_d_min_m for row in rows])
         singular = np.array([row.worst_singularity for row in rows])
         _scatter(left, d_min, tracking, rows, chosen)
@@ -47,9 +55,7 @@ def _scatter(
     rows: Sequence[Ranked],
     chosen: Candidate,
 ) -> None:
-    kinds = np.array(
-        ["fell" if row.falls else "lost" if row.lost else "stood and followed" for row in rows]
-    )
+    kinds = np.array([_kind(row) for row in rows])
     for kind, color in _COLORS.items():
         of_kind = kinds == kind
         if of_kind.any():
@@ -72,3 +78,11 @@ def _scatter(
                 zorder=3,
                 label="ranked first",
             )
+
+
+def _kind(row: Ranked) -> str:
+    if row.falls:
+        return "fell"
+    if row.lost:
+        return "lost its reference"
+    return "came near a singular shape" if row.singular else "stood and followed"

@@ -11,6 +11,7 @@ import numpy as np
 
 from snake_control.experiment.study.candidates import Candidate
 from snake_control.experiment.study.trial import Outcome
+from snake_control.model.singular_shape import SINGULAR_ABOVE
 
 LOST_M = 0.02
 """A head further than this from its reference (root mean square, last third) has lost it."""
@@ -25,6 +26,7 @@ class Ranked:
         candidate: the choice.
         falls: on how many trajectories the robot fell.
         lost: on how many others the head lost its reference (``LOST_M``).
+        singular: on how many it came nearer to a singular shape than ``SINGULAR_ABOVE``.
         position_error_rms_m, rotation_error_rms_rad, worst_singularity, min_d_min_m,
         peak_speed_rad_s, range_steps: as in ``Outcome``.
         mean_place: mean place (1 is best) in tracking, singularity, d_min and peak speed.
@@ -34,6 +36,7 @@ class Ranked:
     candidate: Candidate
     falls: int
     lost: int
+    singular: int
     position_error_rms_m: float
     rotation_error_rms_rad: float
     worst_singularity: float
@@ -44,10 +47,10 @@ class Ranked:
 
 
 def ranking(outcomes: Iterable[Outcome]) -> list[Ranked]:
-    """Rank choices: fewest falls first, then fewest lost references, then the best mean place.
+    """Rank choices: fewest falls first, then fewest lost references, then fewest singular shapes.
 
-    The mean place weighs tracking, distance from singular shapes, margin against falling and joint
-    speed alike, without mixing their units.
+    Among equals the mean place decides: it weighs tracking, distance from singular shapes, margin
+    against falling and joint speed alike, without mixing their units.
     """
     of: dict[Candidate, list[Outcome]] = {}
     for outcome in outcomes:
@@ -68,7 +71,7 @@ def ranking(outcomes: Iterable[Outcome]) -> list[Ranked]:
         dataclasses.replace(row, mean_place=float(place))
         for row, place in zip(worst, places, strict=True)
     ]
-    rows.sort(key=lambda row: (row.falls, row.lost, row.mean_place, row.candidate))
+    rows.sort(key=lambda row: (row.falls, row.lost, row.singular, row.mean_place, row.candidate))
     return [dataclasses.replace(row, rank=i) for i, row in enumerate(rows, start=1)]
 
 
@@ -78,6 +81,7 @@ def _worst(candidate: Candidate, runs: Sequence[Outcome]) -> Ranked:
         candidate=candidate,
         falls=sum(run.fell for run in runs),
         lost=sum(run.position_error_rms_m > LOST_M for run in runs if not run.fell),
+        singular=sum(run.worst_singularity > SINGULAR_ABOVE for run in runs),
         position_error_rms_m=max(run.position_error_rms_m for run in runs),
         rotation_error_rms_rad=max(run.rotation_error_rms_rad for run in runs),
         worst_singularity=max(run.worst_singularity for run in runs),
@@ -97,12 +101,12 @@ def _places(values: Sequence[float]) -> list[float]:
 
 
 _HEADER = (
-    f"{'rank':>4}  {'wheelless':14}{'H-SCPs':>7}{'falls':>6}{'lost':>5}{'tracking':>10}"
-    f"{'singular':>9}{'d_min':>8}{'speed':>7}{'at end':>7}"
+    f"{'rank':>4}  {'wheelless':12}{'H-SCPs':>7}{'falls':>6}{'lost':>5}{'sing.':>6}"
+    f"{'tracking':>9}{'nearness':>9}{'d_min':>6}{'speed':>8}{'ends':>6}"
 )
 _UNITS = (
-    f"{'':4}  {'':14}{'':7}{'':6}{'':5}{'[mm rms]':>10}{'[0..1]':>9}{'[mm]':>8}{'[rad/s]':>7}"
-    f"{'[%]':>7}"
+    f"{'':4}  {'':12}{'':7}{'':6}{'':5}{'':6}{'[mm rms]':>9}{'[0..1]':>9}{'[mm]':>6}"
+    f"{'[rad/s]':>8}{'[%]':>6}"
 )
 
 
@@ -127,9 +131,9 @@ def _line(row: Ranked, mark: str) -> str:
     links = " ".join(map(str, row.candidate.wheelless_links)) or "none"
     joints = " ".join(map(str, row.candidate.head_scp_joints)) or "none"
     return (
-        f"{row.rank:>4}{mark} {links:14}{joints:>7}{row.falls:>6}{row.lost:>5}"
-        f"{1e3 * row.position_error_rms_m:>10.2f}{row.worst_singularity:>9.3f}"
-        f"{1e3 * row.min_d_min_m:>8.1f}{row.peak_speed_rad_s:>7.2f}{100 * row.range_steps:>7.1f}"
+        f"{row.rank:>4}{mark} {links:12}{joints:>7}{row.falls:>6}{row.lost:>5}{row.singular:>6}"
+        f"{1e3 * row.position_error_rms_m:>9.2f}{row.worst_singularity:>9.3f}"
+        f"{1e3 * row.min_d_min_m:>6.1f}{row.peak_speed_rad_s:>8.2f}{100 * row.range_steps:>6.1f}"
     )
 
 
@@ -138,19 +142,24 @@ def verdict(rows: Sequence[Ranked], chosen: Candidate) -> str:
     own = next((row for row in rows if row.candidate == chosen), None)
     if own is None:
         return f"The configured choice ({chosen}) was not among those tried."
-    safe = [row for row in rows if row.falls == 0 and row.lost == 0]
-    count = f"{len(safe)} of {len(rows)} choices neither fell nor lost their reference"
+    safe = [row for row in rows if not (row.falls or row.lost or row.singular)]
+    count = (
+        f"{len(safe)} of {len(rows)} choices neither fell, nor lost their reference, nor came near "
+        "a singular shape"
+    )
     if own.falls:
         how = f"fell on {own.falls} of the trajectories"
     elif own.lost:
         how = f"lost its reference on {own.lost} of the trajectories"
+    elif own.singular:
+        how = f"came near a singular shape on {own.singular} of the trajectories"
     else:
-        how = "did neither"
+        how = "did none of these"
     best = rows[0].candidate
     first = "it is the best" if best == chosen else f"the best is {best}"
     return (
-        f"The configured choice ({chosen}) {how} and ranks {own.rank} of {len(rows)}; "
-        f"{count}; {first}."
+        f"{count[0].upper()}{count[1:]}. The configured choice ({chosen}) {how} and ranks "
+        f"{own.rank} of {len(rows)}; {first}."
     )
 
 

@@ -15,7 +15,7 @@ from snake_control.experiment.study.ranking import (
 )
 from snake_control.experiment.study.trial import Outcome
 
-A, B, C, D = (Candidate((link,), (3,)) for link in (7, 8, 9, 10))
+A, B, C, D, E = (Candidate((link,), (3,)) for link in (7, 8, 9, 10, 11))
 
 
 def outcome(candidate, trajectory="line", **changes):
@@ -35,29 +35,31 @@ def order(outcomes):
     return [row.candidate for row in ranking(outcomes)]
 
 
-def test_a_fall_is_worse_than_anything_and_a_lost_reference_comes_next():
+def test_a_fall_is_worst_then_a_lost_reference_then_a_singular_shape():
     outcomes = [
         outcome(A, fell_at_s=30.0, position_error_rms_m=math.inf, min_d_min_m=-0.001),
         outcome(B, position_error_rms_m=0.05),
         outcome(C, position_error_rms_m=0.019, worst_singularity=0.9, peak_speed_rad_s=5.0),
         outcome(D),
+        outcome(E, worst_singularity=0.96, min_d_min_m=0.03, peak_speed_rad_s=0.5),
     ]
-    assert order(outcomes) == [D, C, B, A]
+    assert order(outcomes) == [D, C, E, B, A]
     rows = ranking(outcomes)
-    assert [(row.falls, row.lost) for row in rows] == [(0, 0), (0, 0), (0, 1), (1, 0)]
-    assert [row.rank for row in rows] == [1, 2, 3, 4]
+    counts = [(row.falls, row.lost, row.singular) for row in rows]
+    assert counts == [(0, 0, 0), (0, 0, 0), (0, 0, 1), (0, 1, 0), (1, 0, 0)]
+    assert [row.rank for row in rows] == [1, 2, 3, 4, 5]
 
 
 def test_the_worst_trajectory_counts():
     outcomes = [
         outcome(A, "line"),
-        outcome(A, "arc", worst_singularity=0.95, min_d_min_m=0.001, position_error_rms_m=0.01),
+        outcome(A, "arc", worst_singularity=0.94, min_d_min_m=0.001, position_error_rms_m=0.01),
         outcome(B, "line", worst_singularity=0.6),
         outcome(B, "arc", worst_singularity=0.6),
     ]
     assert order(outcomes) == [B, A]
     worst = ranking(outcomes)[1]
-    assert (worst.worst_singularity, worst.min_d_min_m) == (0.95, 0.001)
+    assert (worst.worst_singularity, worst.min_d_min_m) == (0.94, 0.001)
     assert worst.position_error_rms_m == 0.01
 
 
@@ -79,10 +81,10 @@ def test_verdict_and_table_name_the_robot_s_own_choice():
     assert "ranks 3 of 4" in verdict(rows, C)
     assert "4 of 4 choices neither fell" in verdict(rows, C)
     assert "it is the best" in verdict(rows, A)
-    assert "not among those tried" in verdict(rows, Candidate((11,), (3,)))
+    assert "not among those tried" in verdict(rows, Candidate((12,), (3,)))
     table = format_ranking(rows, D, most=2).splitlines()
     assert [line.split()[0] for line in table[2:]] == ["1", "2", "..", "4*"]
-    assert all(len(line) <= 79 for line in table)
+    assert all(len(line) <= 80 for line in table)
 
 
 def test_csv_holds_every_row(tmp_path):
