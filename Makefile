@@ -20,7 +20,7 @@ help:
 	  '             CASE=1|2|3 (default 3)  DURATION=seconds (default 60)  SEED=n (default 1)' \
 	  'make test    lint, then all tests' \
 	  'make lint    style, types and the import rules' \
-	  'make bench   time the control step over robot lengths; results in out/bench.json' \
+	  'make bench   time control step, dynamics and lockstep; results in out/bench.json' \
 	  'make clean   remove all that the others made' \
 	  '' \
 	  'Each does the set-up that it needs, once: packages in .venv, messages in install.' \
@@ -66,7 +66,13 @@ test: lint build/ready
 lint: .venv/ready
 	@bash scripts/lint.sh
 
-bench: build/ready
+.venv/bench: .venv/ready requirements/bench.txt
+	@bash scripts/quietly.sh .venv/bench.log "Installing what the benchmarks compare with" \
+	  .venv/bin/python -m pip install --disable-pip-version-check --no-input --no-deps \
+	  -r requirements/bench.txt
+	@touch $@
+
+bench: build/ready .venv/bench
 	@. scripts/env.sh && python -m benchmarks.run
 
 clean:

@@ -1,110 +1,58 @@
-"""Times the control step over robots of several lengths and writes `out/bench.json`.
-
-Figures are medians of one process; compare ratios, since machines and their load differ. Each
-robot's blocks alternate with those of the shortest robot, so that a change of the machine's
-speed during the run meets both alike.
-"""
+"""Runs all benchmarks and writes `out/bench.json`."""
 
 from __future__ import annotations
 
 import argparse
+import importlib.metadata
 import json
 import os
 import platform
-import statistics
-import time
-from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
-from tqdm import tqdm
+from benchmarks import dynamics, growth, lockstep, pink_ik
 
-from snake_control.config import ControllerConfig, RobotConfig
-from snake_control.control.reference import Reference
-from snake_control.control.scp_controller import ScpController
-from snake_control.model.floor import head_pose_on_floor
-from snake_control.plant.kinematic import KinematicPlant
-
-LENGTHS = (12, 24, 48, 96)
-
-
-def robot_of(n: int) -> RobotConfig:
-    """Return the paper's robot with its base continued to n links; links 7, 9, 11 wheelless."""
-    start = RobotConfig().start_joint_angles_rad
-    return RobotConfig(
-        links=n,
-        joint_axes=("pitch", "yaw", "pitch", "yaw", "pitch") + ("yaw",) * (n - 6),
-        start_joint_angles_rad=(*start, *(0.3 * np.sin(0.7 * np.arange(12, n)))),
-    )
+# Name in the result: what measures it, from the number of blocks and of calls in a block.
+BENCHMARKS = {
+    "control_step": growth.measure,
+    "control_step_and_pink": pink_ik.measure,
+    "plant_step": growth.measure_plant,
+    "reduced_dynamics": dynamics.measure,
+    "lockstep_case_3": lockstep.measure,
+}
 
 
-def control_step(robot: RobotConfig) -> Callable[[], object]:
-    """Return a call of the whole velocity control step of Case 3."""
-    controller = ScpController(robot, ControllerConfig(case=3))
-    phi = np.array(robot.start_joint_angles_rad)
-    q = np.concatenate((head_pose_on_floor(robot, phi, np.zeros(3)), phi))
-    w_d = np.array([0.0, 0.0, 0.2, np.pi / 8, np.pi / 8, 0.0])
-    reference = Reference(w_d, np.array([0.01, 0.0, 0.0, 0.0, 0.0, 0.0]))
-    return lambda: controller.step(q, None, reference, 0.0)
-
-
-def plant_step(robot: RobotConfig) -> Callable[[], object]:
-    """Return a call of one step of the kinematic plant, joints at rest."""
-    plant = KinematicPlant(robot)
-    plant.reset(robot.start_joint_angles_rad)
-    still = np.zeros(robot.joints)
-    return lambda: plant.step(still, 1e-3)
-
-
-def block(call: Callable[[], object], calls: int) -> float:
-    """Return the median time of one call [s]."""
-    times = []
-    for _ in range(calls):
-        start = time.perf_counter()
-        call()
-        times.append(time.perf_counter() - start)
-    return statistics.median(times)
-
-
-def measure(
-    make: Callable[[RobotConfig], Callable[[], object]], blocks: int, calls: int, title: str
-) -> dict[str, dict[str, float]]:
-    """Time a call over all lengths, each in blocks paired with blocks of the shortest robot."""
-    shortest = make(robot_of(LENGTHS[0]))
-    found = {}
-    for n in tqdm(LENGTHS, desc=title):
-        call = make(robot_of(n))
-        block(call, calls)
-        pairs = [(block(call, calls), block(shortest, calls)) for _ in range(blocks)]
-        found[str(n)] = {
-            "median_ms": 1e3 * statistics.median(pair[0] for pair in pairs),
-            f"ratio_to_{LENGTHS[0]}_links": statistics.median(p[0] / p[1] for p in pairs),
-        }
-    return found
+def machine() -> dict[str, object]:
+    """Return what the figures belong to."""
+    names = ("numpy", "scipy", "pin", "pin-pink", "daqp")
+    return {
+        "processor": platform.machine(),
+        "cores": os.cpu_count(),
+        "python": platform.python_version(),
+        **{name: importlib.metadata.version(name) for name in names},
+    }
 
 
 def main() -> int:
-    """Run all benchmarks."""
+    """Run all benchmarks, or those that are named."""
     parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(BENCHMARKS)}")
     parser.add_argument("--out", type=Path, default=Path("out/bench.json"))
-    parser.add_argument("--blocks", type=int, default=15, help="paired blocks for each robot")
+    parser.add_argument("--blocks", type=int, default=25, help="rounds of blocks for each robot")
     parser.add_argument("--calls", type=int, default=40, help="calls in a block")
     arguments = parser.parse_args()
-    result = {
-        "machine": {
-            "processor": platform.machine(),
-            "cores": os.cpu_count(),
-            "python": platform.python_version(),
-            "numpy": np.__version__,
-        },
-        "control_step": measure(control_step, arguments.blocks, arguments.calls, "control step"),
-        "plant_step": measure(plant_step, arguments.blocks, arguments.calls, "plant step"),
+    for name in arguments.names:
+        if name not in BENCHMARKS:
+            parser.error(f"no benchmark {name}; there are {', '.join(BENCHMARKS)}")
+    found = {
+        name: BENCHMARKS[name](arguments.blocks, arguments.calls)
+        for name in arguments.names or BENCHMARKS
     }
     arguments.out.parent.mkdir(parents=True, exist_ok=True)
-    arguments.out.write_text(json.dumps(result, indent=2) + "\n")
-    for name in ("control_step", "plant_step"):
-        for n, figures in result[name].items():
-            print(f"{name:13} n = {n:>3}  " + "  ".join(f"{k} {v:.3f}" for k, v in figures.items()))
+    arguments.out.write_text(json.dumps({"machine": machine(), **found}, indent=2) + "\n")
+    for name, rows in found.items():
+        for row, figures in rows.items():
+            text = "  ".join(f"{key} {value:.3g}" for key, value in figures.items())
+            print(f"{name:22} {row:>9}  {text}")
     print(f"written to {arguments.out}")
     return 0
 

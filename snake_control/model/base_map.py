@@ -68,8 +68,8 @@ class BaseMap:
         found: Array = blas.dtrsv(self._arms, right, trans=1, overwrite_x=1)
         return found[1:]
 
-    def gradient(self, weights: Array) -> Array:
-        """Return the gradient of sum(weights * N) by the base joint angles, weights held constant.
+    def gradient(self, weights: Array, factor: float = 1.0) -> Array:
+        """Return factor times the gradient of sum(weights * N) by the base joint angles.
 
         With the adjoint solution lambda of the substitution it is -sum(lambda * d(sideways
         velocity)). When joint a turns what lies behind it, the velocity of link k as that link sees
@@ -77,7 +77,8 @@ class BaseMap:
         running sum along the body.
 
         Args:
-            weights: shape of N; those of B-SCP rows count for nothing.
+            weights: held constant, shape of N; those of B-SCP rows count for nothing.
+            factor: of the result.
 
         Returns:
             Shape (n_b - 1,).
@@ -88,7 +89,7 @@ class BaseMap:
         behind = np.add.accumulate(force[::-1])[::-1]
         behind *= self._turned_hitch_velocities().conj()
         gradient: Array = np.add.reduce(behind.real, axis=1)
-        gradient *= -1.0 / self._g.s.robot.half_length_m
+        gradient *= -factor / self._g.s.robot.half_length_m
         return gradient
 
     def _turned_hitch_velocities(self) -> NDArray[np.complex128]:
@@ -97,6 +98,6 @@ class BaseMap:
         A link that turns about its front end moves its rear end sideways, by -i times its length.
         """
         turning = np.add.accumulate(self.turns[:-1])
-        velocities = np.add.accumulate(self._g.links[:-1, None] * turning)
-        velocities += self._g.s.base.turned_entry_velocity
-        return velocities
+        changes = self._g.links[:-1, None] * turning
+        changes[0] += self._g.s.base.turned_entry_velocity
+        return np.add.accumulate(changes)

@@ -33,9 +33,8 @@ class HeadBlock:
     Attributes:
         by_joint: what the four rows say of each head joint, n_h times four numbers.
         determinant: absolute value of the block's determinant.
-        cofactors: derivative of ``determinant`` by each entry of the block: four rows of four, one
-            for each head joint of theta_bar. They exist where the inverse does not.
-        inverse: of the block, laid out as ``cofactors``; damped near a singular posture.
+        inverse: of the block: four rows of four, one for each head joint of theta_bar; damped near
+            a singular posture.
         damping: see ``damping_of``; 0 where the inverse is exact.
         log_determinant: of ``determinant``, singular values raised to the damping's threshold.
     """
@@ -45,25 +44,33 @@ class HeadBlock:
         self._g = g
         self.by_joint = self.measure(g.chain.twists)
         columns = [self.by_joint[joint] for joint in g.s.head_joints]
-        determinant, (a, b, c, d) = adjugate(*columns)
+        signed, (a, b, c, d) = adjugate(*columns)
         # The columns were taken for rows, so this is the inverse but for its determinant.
-        cofactors = tuple(zip(a, b, c, d, strict=True))
-        self.determinant = abs(determinant)
+        self._adjugate = list(zip(a, b, c, d, strict=True))
+        self._sign = math.copysign(1.0, signed)
+        self.determinant = abs(signed)
         if math.hypot(*a, *b, *c, *d) < self.determinant / EPSILON:
             # Then no singular value is as small as EPSILON.
-            self.inverse = _scaled(cofactors, 1.0 / determinant)
+            self.inverse = _scaled(self._adjugate, 1.0 / signed)
             self.damping = 0.0
             self.log_determinant = math.log(self.determinant)
         else:
             self._damp(columns)
-        self.cofactors = cofactors if determinant >= 0.0 else _scaled(cofactors, -1.0)
 
     def _damp(self, columns: list[Four]) -> None:
         U, sigma, Vt = np.linalg.svd(np.array(columns).T)
         inverse = (Vt.T * damped_reciprocals(sigma)) @ U.T
-        self.inverse = tuple((a, b, c, d) for a, b, c, d in inverse.tolist())
+        self.inverse = [(a, b, c, d) for a, b, c, d in inverse.tolist()]
         self.damping = damping_of(float(sigma[3]))
         self.log_determinant = float(np.log(np.maximum(sigma, EPSILON)).sum())
+
+    @property
+    def cofactors(self) -> FourByFour:
+        """Derivative of ``determinant`` by each entry of the block, laid out as ``inverse``.
+
+        They exist where the inverse does not.
+        """
+        return _scaled(self._adjugate, self._sign)
 
     def measure(self, twists: Iterable[Twist]) -> list[Four]:
         """Return what the four rows say of each of some motions of the base frame.
@@ -156,4 +163,4 @@ class HeadBlock:
 
 
 def _scaled(rows: FourByFour, factor: float) -> FourByFour:
-    return tuple((a * factor, b * factor, c * factor, d * factor) for a, b, c, d in rows)
+    return [(a * factor, b * factor, c * factor, d * factor) for a, b, c, d in rows]

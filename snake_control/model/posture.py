@@ -117,7 +117,7 @@ class Posture:
     @lazy
     def log_V_b1_by_base(self) -> Array:
         """Derivative of log V_b1 by the base joint angles, (n_b - 1,): all that (27) needs."""
-        return 2.0 * self.k.base.gradient(self._gram.transposed_pseudo_inverse())
+        return self.k.base.gradient(self._gram.transposed_pseudo_inverse(), 2.0)
 
     @property
     def V_b1(self) -> float:

@@ -146,10 +146,12 @@ def _from_above(g: Geometry, points: list[complex]) -> list[complex]:
 def _center_of_mass(g: Geometry) -> Vector:
     """Return the centre of mass in base coordinates."""
     base = complex(g.s.base.mass.dot(g.middles))
-    center = (base.real, base.imag, 0.0)
-    for mass, link in zip(g.s.head_mass, g.chain.centers, strict=True):
-        center = along(center, mass, link)
-    return center
+    x, y, z = base.real, base.imag, 0.0
+    for mass, (link_x, link_y, link_z) in zip(g.s.head_mass, g.chain.centers, strict=True):
+        x += mass * link_x
+        y += mass * link_y
+        z += mass * link_z
+    return x, y, z
 
 
 def nearest_edge(corners: list[complex], point: complex) -> tuple[int, float, float]:

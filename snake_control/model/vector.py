@@ -12,7 +12,7 @@ Rows = tuple[Vector, Vector, Vector]
 Twist = tuple[Vector, Vector]
 """Linear velocity of a frame's origin, and angular velocity."""
 Four = tuple[float, float, float, float]
-FourByFour = tuple[Four, ...]
+FourByFour = list[Four]
 """Four rows."""
 
 ZERO: Vector = (0.0, 0.0, 0.0)
@@ -68,7 +68,7 @@ def adjugate(a: Four, b: Four, c: Four, d: Four) -> tuple[float, FourByFour]:
     s3, s4, s5 = a1 * b2 - b1 * a2, a1 * b3 - b1 * a3, a2 * b3 - b2 * a3
     t0, t1, t2 = c0 * d1 - d0 * c1, c0 * d2 - d0 * c2, c0 * d3 - d0 * c3
     t3, t4, t5 = c1 * d2 - d1 * c2, c1 * d3 - d1 * c3, c2 * d3 - d2 * c3
-    return s0 * t5 - s1 * t4 + s2 * t3 + s3 * t2 - s4 * t1 + s5 * t0, (
+    return s0 * t5 - s1 * t4 + s2 * t3 + s3 * t2 - s4 * t1 + s5 * t0, [
         (
             b1 * t5 - b2 * t4 + b3 * t3,
             a2 * t4 - a1 * t5 - a3 * t3,
@@ -93,4 +93,4 @@ def adjugate(a: Four, b: Four, c: Four, d: Four) -> tuple[float, FourByFour]:
             d1 * s1 - d0 * s3 - d2 * s0,
             c0 * s3 - c1 * s1 + c2 * s0,
         ),
-    )
+    ]

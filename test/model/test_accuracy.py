@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from mpmath import mp
 
 from snake_control.config import RobotConfig
 from snake_control.model.floor import head_pose_on_floor
 from snake_control.model.posture import Posture
-from support import exact
 from support.robots import PAPER
+
+mp = pytest.importorskip("mpmath").mp
+exact = pytest.importorskip("support.exact")
 
 
 def long_robot(n, wheelless_links):

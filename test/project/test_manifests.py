@@ -56,7 +56,10 @@ def test_every_import_of_the_package_is_declared():
 def test_every_import_of_the_tests_is_declared():
     declared = _declared("depend", "exec_depend", "test_depend")
     # distutils is setuptools' own on the newer Pythons.
-    assert _imported("test", "benchmarks") - declared - {"distutils"} == set()
+    # requirements/bench.txt has what benchmarks compare with, requirements/dev.txt the exact
+    # arithmetic; where that is missing its test is skipped.
+    found = _imported("test", "benchmarks") - declared
+    assert found - {"distutils", "mpmath", "pink", "threadpoolctl"} == set()
 
 
 def test_nothing_is_declared_in_vain():

@@ -10,7 +10,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 PIN = re.compile(r"(?P<name>[A-Za-z0-9_.-]+)==(?P<version>[A-Za-z0-9_.+]+)(?P<marker> *;.*)?")
-FILES = ("runtime", "dev", "ros")
+FILES = ("runtime", "dev", "ros", "bench")
 
 
 def _lines(name: str) -> list[str]:
