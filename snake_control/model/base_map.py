@@ -49,8 +49,8 @@ class BaseMap:
         right = base.known.copy()
         # Against the speeds sideways of all links moving forward, and moving to the left, at l m/s.
         self._rightward = g.forward * base.rightward
-        right[0] += self._rightward.real
-        right[1] += self._rightward.imag
+        right[0], right[1] = self._rightward.real, self._rightward.imag
+        right[base.entries - 1, 0] = 1.0
         # Substitution keeps every row to full precision, however fast rows grow along the body.
         self.turns: Array = blas.dtrsm(1.0, self._arms, right.T, trans_a=1, overwrite_b=1)
         self.N = self.turns[1:]

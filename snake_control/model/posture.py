@@ -14,7 +14,7 @@ from snake_control.model.redundancy import Kinematics, kinematics
 from snake_control.model.singular_shape import SingularShape, singular_shape
 from snake_control.model.singularity import GramDeterminant, attitude_log, attitude_log_gradient
 from snake_control.model.stability import Support, support
-from snake_control.model.vector import ZERO, Vector, along, dot
+from snake_control.model.vector import ZERO, Vector, dot
 
 Array = NDArray[np.float64]
 
@@ -64,13 +64,14 @@ class Posture:
     @property
     def V_h_by_head(self) -> list[float]:
         """Derivative of V_h by each head joint, n_h numbers: all that (25) needs."""
-        by_joints, _ = self._V_h_parts
-        return by_joints
+        scale, by_joints, _ = self._V_h_parts
+        return [scale * value for value in by_joints]
 
     @lazy
     def V_h_gradient(self) -> Array:
         """Gradient of V_h; exact in singular postures, too."""
-        return self._by_head(*self._V_h_parts)
+        scale, by_joints, by_turning = self._V_h_parts
+        return scale * self._by_head(by_joints, by_turning)
 
     @lazy
     def log_V_h_gradient(self) -> Array:
@@ -78,14 +79,12 @@ class Posture:
         return self._by_head(*self._log_V_h_parts)
 
     @lazy
-    def _V_h_parts(self) -> tuple[list[float], Vector]:
-        """Derivative of V_h by head joints and by turning the base frame."""
+    def _V_h_parts(self) -> tuple[float, list[float], Vector]:
+        """Derivative of V_h by head joints and by turning the base frame, after its factor."""
         if self.k.damping == 0.0:
-            scale, (by_joints, by_turning) = self.V_h, self._log_V_h_parts
-        else:
-            scale = self.robot.half_length_m ** (2 + len(self.k.s.theta_b))
-            by_joints, by_turning = self.k.head.gradient(self.k.head.cofactors)
-        return [scale * value for value in by_joints], along(ZERO, scale, by_turning)
+            return self.V_h, *self._log_V_h_parts
+        scale = self.robot.half_length_m ** (2 + len(self.k.s.theta_b))
+        return scale, *self.k.head.gradient(self.k.head.cofactors)
 
     @lazy
     def _log_V_h_parts(self) -> tuple[list[float], Vector]:

@@ -117,11 +117,9 @@ def _sum(
     tasks: _Weighted, part: Callable[[SubTask, Posture], Array], posture: Posture, size: int
 ) -> Array:
     """Return the derivative of the weighted sum by the joints of one part, (size,)."""
-    total: Array | None = None
-    for weight, task in tasks:
-        by_joints = part(task, posture)
-        # The sum of squares is quicker; where it overflows, every component is looked at.
-        if math.isfinite(by_joints.dot(by_joints)) or np.isfinite(by_joints).all():
-            weighted = weight * by_joints
-            total = weighted if total is None else total + weighted
-    return np.zeros(size) if total is None else total
+    parts = [weight * part(task, posture) for weight, task in tasks]
+    total: Array = sum(parts[1:], start=parts[0]) if parts else np.zeros(size)
+    # The sum of squares is quicker; where it overflows, every component is looked at.
+    if math.isfinite(total.dot(total)):
+        return total
+    return sum((each for each in parts if np.isfinite(each).all()), start=np.zeros(size))

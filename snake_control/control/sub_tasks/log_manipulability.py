@@ -16,7 +16,7 @@ class LogManipulability(SubTask):
     """V = log(v^2 + floor^2) / 2 with v = V_h / l^(n_b - m_b + 1), both without unit.
 
     V_h is the determinant of the 4 x 4 head block [m^2] times l^(n_b - m_b - 1) (see
-    ``model/manipulability.py``), so v takes out the base's length as well as the size of the
+    ``model/posture.py``), so v takes out the base's length as well as the size of the
     robot. Where the head is well shaped (v of the order of 0.01) the gradient is that of log V_h;
     the floor of 1e-6 bounds it, and it is 0 where V_h = 0.
     """
