@@ -42,6 +42,6 @@ fi
 
 files=(-r requirements/dev.txt)
 [ "$world" = jazzy ] || files+=(-r requirements/runtime.txt -r requirements/ros.txt)
-scripts/quietly.sh "$log" "Installing the pinned packages (once; about a minute)" \
+scripts/quietly.sh "$log" "Installing the pinned packages (once; about two minutes)" \
   .venv/bin/python -m pip install --disable-pip-version-check --no-input "${files[@]}"
 [ "$world" = jazzy ] || .venv/bin/python scripts/localise_cmake.py
