@@ -24,7 +24,7 @@ from snake_control.model.singular_shape import singular_shape
 from snake_control.model.structure import Structure, structure
 from snake_control.plant.kinematic import KinematicPlant
 from snake_control.plant.plant import PlantState
-from snake_control.plant.torque import MAX_SUBSTEP_S, TorquePlant
+from snake_control.plant.torque import TorquePlant
 from snake_control.trajectory.configured import configured_trajectory
 
 SERVOS = ("perfect", "limited")
@@ -67,7 +67,7 @@ class Settings:
             "servos": self.servos,
             "carry_remainder": self.carry_remainder if limited else None,
             "control_rate_hz": self.rate_hz,
-            "plant_step_s": self.plant_step_s if self.controller == "velocity" else MAX_SUBSTEP_S,
+            "plant_step_s": self.plant_step_s if self.controller == "velocity" else None,
             "requested_duration_s": self.duration_s,
         }
 

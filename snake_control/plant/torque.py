@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.integrate import DOP853
 
 from snake_control.config import RobotConfig
 from snake_control.errors import ModelError
@@ -19,8 +19,11 @@ from snake_control.plant.plant import PlantState
 
 Array = NDArray[np.float64]
 
-MAX_SUBSTEP_S = 1e-3
-"""Longest step of the integration; see docs/dynamics.md for what it costs in accuracy."""
+TOLERANCE = 1e-9
+"""Relative error of a step of the integration; a thousandth of it is the absolute one [SI]."""
+
+# What needs shorter steps than this is no robot: a motion that explodes.
+_SHORTEST_STEP_S = 1e-6
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -48,23 +51,23 @@ class TorquePlant:
 
     The state is p = [x, y, yaw, phi] of the base's front end and the joints, and v = p_dot.
     Accelerations and wheel forces follow from one system of equations (Lagrange multipliers), not
-    from the elimination (14)-(20) that the torque controller uses. The fourth-order Runge-Kutta
-    rule integrates; after each step the velocity goes to the nearest one, as kinetic energy
-    measures it, that the wheels allow.
+    from the elimination (14)-(20) that the torque controller uses. The Runge-Kutta pair of
+    Dormand and Prince of order 8 integrates in steps that its own error estimate chooses; then the
+    velocity goes to the nearest one, as kinetic energy measures it, that the wheels allow.
 
     A robot that falls goes on as if the floor held its base; ``fallen`` says so.
     """
 
-    def __init__(self, robot: RobotConfig, max_substep_s: float = MAX_SUBSTEP_S) -> None:
+    def __init__(self, robot: RobotConfig, tolerance: float = TOLERANCE) -> None:
         """Make a plant; call ``reset`` or it stands at the robot's start posture.
 
         Args:
             robot: the robot.
-            max_substep_s: longest step of the integration, > 0 [s].
+            tolerance: relative error of a step of the integration, > 0.
         """
         self._robot = robot
         self._body = FloorBody(robot)
-        self._max_substep_s = max_substep_s
+        self._tolerance = tolerance
         self.reset(robot.start_joint_angles_rad)
 
     def reset(
@@ -145,6 +148,10 @@ class TorquePlant:
         force[3:] += np.asarray(tau, dtype=float)
         return _constrained(terms.M, terms.wheel_rows, force, -terms.wheel_drift)
 
+    def energy(self, p: ArrayLike, v: ArrayLike) -> float:
+        """Return kinetic and potential energy in any state [J]; p, v as for ``acceleration``."""
+        return self._body.energy(np.asarray(p, dtype=float), np.asarray(v, dtype=float))
+
     @property
     def p(self) -> Array:
         """[x, y, yaw, phi] of the base's front end and the joints, (n + 2,) [m, rad]."""
@@ -156,30 +163,33 @@ class TorquePlant:
         return self._v.copy()
 
     def _advance(self, torques: Callable[[Array, Array, float], Array], dt: float) -> None:
-        steps = max(1, math.ceil(dt / self._max_substep_s - 1e-9))
-        h = dt / steps
-        for step in range(steps):
-            self._runge_kutta(torques, step * h, h)
-        if not np.isfinite(self._v).all():
+        if dt == 0.0:
+            return
+        half = len(self._p)
+
+        def rate(t: float, y: Array) -> Array:
+            p, v = y[:half], y[half:]
+            return np.concatenate((v, self.acceleration(p, v, torques(p, v, t))[0]))
+
+        # A step far too long ends in numbers without end: the error below names it.
+        with np.errstate(over="ignore", invalid="ignore"):
+            solver = DOP853(
+                rate,
+                0.0,
+                np.concatenate((self._p, self._v)),
+                dt,
+                first_step=abs(dt),
+                rtol=self._tolerance,
+                atol=1e-3 * self._tolerance,
+            )
+            while solver.status == "running":
+                solver.step()
+                if solver.status == "running" and solver.step_size < _SHORTEST_STEP_S:
+                    break
+        p, v = solver.y[:half], solver.y[half:]
+        if solver.status != "finished" or not np.isfinite(v).all():
             raise ModelError("the motion is no longer finite: torques or time step too large")
-        self._v = self._allowed(self._p, self._v)
-
-    def _runge_kutta(
-        self, torques: Callable[[Array, Array, float], Array], t: float, h: float
-    ) -> None:
-        def rate(p: Array, v: Array, t: float) -> Array:
-            return self.acceleration(p, v, torques(p, v, t))[0]
-
-        p, v = self._p, self._v
-        a_1 = rate(p, v, t)
-        v_2 = v + 0.5 * h * a_1
-        a_2 = rate(p + 0.5 * h * v, v_2, t + 0.5 * h)
-        v_3 = v + 0.5 * h * a_2
-        a_3 = rate(p + 0.5 * h * v_2, v_3, t + 0.5 * h)
-        v_4 = v + h * a_3
-        a_4 = rate(p + h * v_3, v_4, t + h)
-        self._p = p + h / 6 * (v + 2 * v_2 + 2 * v_3 + v_4)
-        self._v = v + h / 6 * (a_1 + 2 * a_2 + 2 * a_3 + a_4)
+        self._p, self._v = p, self._allowed(p, v)
 
     def _allowed(self, p: Array, v: Array) -> Array:
         """Return the velocity nearest to ``v``, in kinetic energy, that keeps the wheels' rows."""
