@@ -145,7 +145,7 @@ def run_case(
 def step_of(sample: LockstepSample[ControlResult]) -> Step:
     """Return the row of velocity control; nobody timed it, and there is no bus."""
     result = sample.result
-    limited = result.speed_scale < 1.0 or bool(result.range_limited)
+    limited = result.speed_scale < 1.0 or bool(result.range_limited) or result.damping > 0.0
     return Step(
         **_common(sample),
         status="limited" if limited else "tracking",
@@ -156,6 +156,7 @@ def step_of(sample: LockstepSample[ControlResult]) -> Step:
         range_limited=result.range_limited,
         sigma_min_B_tilde=result.sigma_min_B_tilde,
         sigma_min_A_hat=result.sigma_min_A_hat,
+        damping=result.damping,
         singular_nearness=result.singular_shape.nearness,
         singular_shape=result.singular_shape.kind,
         effort=sample.state.effort,
@@ -175,6 +176,7 @@ def torque_step_of(sample: LockstepSample[TorqueResult], s: Structure) -> Step:
         range_limited=(),
         sigma_min_B_tilde=math.nan,
         sigma_min_A_hat=math.nan,
+        damping=math.nan,
         singular_nearness=shape.nearness,
         singular_shape=shape.kind,
         effort=sample.result.u,

@@ -46,6 +46,7 @@ class Step:
         d_min: distance to the edge of the support polygon as the controller sees it [m].
         d_min_true: the same of the ground truth [m].
         sigma_min_B_tilde, sigma_min_A_hat: smallest singular values of (7), (11).
+        damping: share of the motion in B_tilde's weakest direction that was given up, 0..1.
         singular_nearness: how near a singular shape of Fig. 5 is, 0..1.
         singular_shape: which: ``parallel`` or ``arc``, empty while unknown.
         fallen: whether the robot has fallen by now, in truth.
@@ -72,6 +73,7 @@ class Step:
     d_min: float
     sigma_min_B_tilde: float
     sigma_min_A_hat: float
+    damping: float
     singular_nearness: float
     singular_shape: str
     w: ArrayLike | None = None
@@ -139,6 +141,7 @@ def columns(robot: RobotConfig) -> tuple[Column, ...]:
         Column("d_min_true", ("d_min_m",)),
         Column("sigma_min_B_tilde", ("sigma_min_B_tilde",)),
         Column("sigma_min_A_hat", ("sigma_min_A_hat",)),
+        Column("damping", ("damping",)),
         Column("singular_nearness", ("singular_nearness",)),
         Column("singular_shape", ("singular_shape",), "text"),
         Column("fallen", ("fallen",), "flag"),

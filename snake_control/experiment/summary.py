@@ -283,6 +283,7 @@ def _limits(series: Series) -> dict[str, Any]:
         "speed_limit_steps": int(np.count_nonzero(scale < 1.0)),
         "speed_limit_steps_by_joint": _count_joints(speed_limited),
         "min_speed_scale": float(np.nanmin(scale)) if np.isfinite(scale).any() else None,
+        "damped_steps": int(np.count_nonzero(series.numbers("damping") > 0.0)),
         "max_abs_joint_angle_rad": float(np.nanmax(phi)) if np.isfinite(phi).any() else None,
     }
 

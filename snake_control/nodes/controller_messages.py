@@ -161,7 +161,7 @@ class ControllerMessages:
             message.speed_limited = message.range_limited = []
             message.v_h = message.v_b1 = message.d_min = math.nan
             message.sigma_min_b_tilde = message.sigma_min_a_hat = math.nan
-            message.singular_nearness = math.nan
+            message.damping = message.singular_nearness = math.nan
             message.singular_shape = ""
         else:
             message.u_unlimited = _array(result.u_unlimited)
@@ -175,6 +175,7 @@ class ControllerMessages:
             message.d_min = float(result.d_min)
             message.sigma_min_b_tilde = float(result.sigma_min_B_tilde)
             message.sigma_min_a_hat = float(result.sigma_min_A_hat)
+            message.damping = float(result.damping)
             message.singular_nearness = float(result.singular_shape.nearness)
             message.singular_shape = str(result.singular_shape.kind)
         return message

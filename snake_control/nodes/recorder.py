@@ -201,6 +201,7 @@ def _step(
         d_min=controller.d_min,
         sigma_min_B_tilde=controller.sigma_min_b_tilde,
         sigma_min_A_hat=controller.sigma_min_a_hat,
+        damping=controller.damping,
         singular_nearness=controller.singular_nearness,
         singular_shape=controller.singular_shape,
         w=None if truth is None else truth.w,

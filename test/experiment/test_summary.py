@@ -166,6 +166,7 @@ def test_limits_name_the_first_joint_at_the_end_of_its_range():
     assert limits["joint_limit_steps"] == 2
     assert limits["joint_limit_steps_by_joint"] == {"joint_4": 1, "joint_11": 2}
     assert limits["speed_limit_steps"] == 2
+    assert limits["damped_steps"] == 0
     assert limits["speed_limit_steps_by_joint"] == {"joint_2": 2, "joint_3": 1}
     assert limits["min_speed_scale"] == 0.25
     assert limits["max_abs_joint_angle_rad"] == pytest.approx(1.1)

@@ -43,6 +43,7 @@ def controller_state(t_s: float, **changes) -> ControllerState:
         "v_h": 1e-7,
         "v_b1": 2e8,
         "d_min": 0.02,
+        "damping": 0.25,
         "singular_nearness": 0.7,
         "singular_shape": "parallel",
     }
@@ -122,6 +123,7 @@ def test_rows_start_with_the_first_step_that_follows(wired):
     assert set(wired.series.texts("status")) == {"limited"}
     assert wired.series.joints("speed_limited") == [(11, 2)] * 3
     assert wired.series.numbers("phi_tilde_dot_d")[0] == pytest.approx([0.1, 0.2, 0.3, 0.4])
+    assert wired.series.numbers("damping") == pytest.approx([0.25] * 3)
     assert wired.series.numbers("singular_nearness") == pytest.approx([0.7] * 3)
     assert wired.series.texts("singular_shape") == ["parallel"] * 3
 

@@ -66,6 +66,7 @@ def test_commands_what_the_control_law_says(rig):
     assert state.v_b1 == pytest.approx(2.4757e8, rel=1e-4)
     assert state.d_min == pytest.approx(0.034238, abs=1e-6)
     assert state.singular_nearness == pytest.approx(expected.singular_shape.nearness, rel=1e-6)
+    assert state.damping == 0.0
     assert state.singular_shape == expected.singular_shape.kind
     assert 0 <= state.head_age < 0.1
 

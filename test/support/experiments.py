@@ -41,6 +41,7 @@ def step(robot: RobotConfig, t_s: float, **changes: Any) -> Step:
         "d_min": 0.03,
         "sigma_min_B_tilde": 0.1,
         "sigma_min_A_hat": 0.2,
+        "damping": 0.0,
         "singular_nearness": 0.6,
         "singular_shape": "arc",
         "w": w_d,
