@@ -20,7 +20,7 @@ def convex_hull(points: Points, listed: list[complex] | None = None) -> list[int
     """Return the corners of the convex hull, counter-clockwise, as indices into ``points``.
 
     Args:
-        points: x + i y, (k,), not all on one line.
+        points: x + i y, (k,), two at least that differ. Of points on one line both ends are found.
         listed: the same as a list, if there is one already.
     """
     if listed is None:

@@ -18,9 +18,15 @@ from snake_control.model.vector import ZERO, Vector, along, combine, cross, dot
 
 Array = NDArray[np.float64]
 
+_TINY = 1e-12
+"""Share of the robot's length below which two contacts count as one."""
+
 
 class Support:
     """How the robot stands.
+
+    Where the contacts are seen on one line or in one point, the polygon is that segment or point:
+    d_min then is minus the distance to it, for nothing stands on it.
 
     Attributes:
         d_min: signed distance from P_G to the nearest edge of the support polygon [m]; positive
@@ -42,7 +48,8 @@ class Support:
             self._hull.reverse()
         self._corners = _from_above(g, [self._wheels[corner] for corner in self._hull])
         self._below = complex(dot(a, self._center), dot(b, self._center))
-        self._edge, self._share, self.d_min = nearest_edge(self._corners, self._below)
+        self._tiny = _TINY * g.s.n * 2.0 * g.s.robot.half_length_m
+        self._edge, self._share, self.d_min = nearest_edge(self._corners, self._below, self._tiny)
 
     @lazy
     def polygon(self) -> Array:
@@ -59,7 +66,7 @@ class Support:
         """Gradient of d_min by q, (n + 5,).
 
         d_min is not smooth where the nearest edge changes: there it is the gradient for the edge
-        that comes first in ``polygon``.
+        that comes first in ``polygon``; 0 where P_G is just above a polygon that is one point.
         """
         n_h = self._g.s.n_h
         gradient = np.zeros(self._g.s.n + 5)
@@ -70,11 +77,18 @@ class Support:
     def _normal(self) -> Vector:
         """Direction in which P_G moves away from the edge fastest, in base coordinates."""
         begin, end = self._corners[self._edge], self._corners[self._edge + 1 - len(self._corners)]
-        if 0.0 < self._share < 1.0 or self.d_min == 0.0:
+        edge, arm = end - begin, self._below - begin
+        length = abs(edge)
+        if length > self._tiny and (0.0 < self._share < 1.0 or self.d_min == 0.0):
             # On an edge its normal is exact even at distance 0; beyond a corner it points there.
-            normal = 1j * (end - begin) / abs(end - begin)
+            normal = 1j * edge / length
+            # A polygon without width is fallen off on both sides.
+            if self.d_min < 0.0 and (arm * normal.conjugate()).real > self._tiny:
+                normal = -normal
+        elif self.d_min == 0.0:
+            normal = 0j
         else:
-            normal = (self._below - begin - self._share * (end - begin)) / self.d_min
+            normal = (arm - self._share * edge) / self.d_min
         return combine(normal.real, self._g.rows[0], normal.imag, self._g.rows[1])
 
     def _feet(self) -> tuple[tuple[int, float], tuple[int, float]]:
@@ -154,34 +168,46 @@ def _center_of_mass(g: Geometry) -> Vector:
     return x, y, z
 
 
-def nearest_edge(corners: list[complex], point: complex) -> tuple[int, float, float]:
+def nearest_edge(corners: list[complex], point: complex, tiny: float) -> tuple[int, float, float]:
     """Return the nearest edge of a convex polygon, where on it (0..1), and the signed distance.
 
     Args:
-        corners: counter-clockwise; edge i goes from corner i to the next.
+        corners: counter-clockwise, at least two; edge i goes from corner i to the next.
         point: inside (positive distance) or outside.
+        tiny: what counts as no length. Edges as short as that are left out, for round-off turns
+            them anywhere; and no point lies inside a polygon as narrow as that.
     """
     nearest = (0, 0.0, math.inf)
     for i, begin in enumerate(corners):
         edge = corners[i + 1 - len(corners)] - begin
+        length = abs(edge)
+        if length <= tiny:
+            continue
         # Real part: along the edge; imaginary part: to its left, which is inside.
         seen = (point - begin) * edge.conjugate()
         if seen.imag < 0.0:
-            return _nearest_edge_from_outside(corners, point)
-        length = abs(edge)
+            return _nearest_edge_from_outside(corners, point, tiny)
         # From inside, the nearest of the edges' lines is met on the edge itself.
         if seen.imag < nearest[2] * length:
             nearest = (i, seen.real / length**2, seen.imag / length)
-    return nearest
+    if tiny < nearest[2] < math.inf:
+        return nearest
+    return _nearest_edge_from_outside(corners, point, tiny)
 
 
-def _nearest_edge_from_outside(corners: list[complex], point: complex) -> tuple[int, float, float]:
+def _nearest_edge_from_outside(
+    corners: list[complex], point: complex, tiny: float
+) -> tuple[int, float, float]:
+    # A polygon that is one point has no edge.
     nearest = (0, 0.0, -math.inf)
     for i, begin in enumerate(corners):
         edge = corners[i + 1 - len(corners)] - begin
+        length = abs(edge)
+        if length <= tiny:
+            continue
         seen = (point - begin) * edge.conjugate()
-        share = min(1.0, max(0.0, seen.real / abs(edge) ** 2))
+        share = min(1.0, max(0.0, seen.real / length**2))
         distance = abs(point - begin - share * edge)
         if distance < -nearest[2]:
             nearest = (i, share, -distance)
-    return nearest
+    return nearest if nearest[2] > -math.inf else (0, 0.0, -abs(point - corners[0]))
