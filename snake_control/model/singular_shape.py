@@ -77,19 +77,26 @@ def singular_shape(g: PlanarBase) -> SingularShape:
     return SingularShape(nearness, ShapeKind.ARC, center)
 
 
+def smallest_extent(g: PlanarBase) -> float:
+    """Return what ``resistance`` takes for the extent of wheels closer together than that [m]."""
+    return 1e-6 * g.s.robot.half_length_m
+
+
 def resistance(g: PlanarBase) -> tuple[Array, Array, float]:
     """Return how the wheels resist rigid motions of the body: a Gram matrix without units.
 
     Returns:
         Gram matrix of the sideways velocities of the wheeled links per [v_x, v_y, extent omega] of
         a rigid body at their centroid, (3, 3); the centroid in base coordinates, (2,) [m]; and
-        the extent, the rms distance of the wheeled links from it [m].
+        the extent, the rms distance of the wheeled links from it [m], but never less than 1e-6 l:
+        where all centres coincide, all axes meet there and the posture counts as an arc.
     """
     rows = lateral_map(g)
     centers = g.centers[g.s.wheeled]
     centroid = centers.mean(axis=0)
     offsets = centers - centroid
     extent = math.sqrt(float(np.vdot(offsets, offsets)) / len(offsets))
+    extent = max(extent, smallest_extent(g))
     # Of a link under omega about the centroid instead of the base frame.
     rows[:, 2] += rows[:, 0] * centroid[1] - rows[:, 1] * centroid[0]
     rows[:, 2] /= extent

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from snake_control.model.constraints import lateral_map
 from snake_control.model.geometry import Geometry
-from snake_control.model.singular_shape import resistance
+from snake_control.model.singular_shape import resistance, smallest_extent
 
 Array = NDArray[np.float64]
 
@@ -43,6 +43,9 @@ def axis_spread(g: Geometry) -> tuple[float, Array]:
     centers = g.centers[s.wheeled]
     offsets = centers - centroid
     pull = (2.0 * determinant / (len(rows) * extent**2)) * offsets
+    if extent == smallest_extent(g):
+        # There the extent is constant.
+        pull *= 0.0
 
     # A base joint turns all links behind it about its hitch: sums of a moment and a force.
     on_links = np.zeros((s.n_b, 3))
