@@ -27,6 +27,8 @@ Array = NDArray[np.float64]
 Plane = NDArray[np.complex128]
 """Vectors or points of the base plane: x + i y in base coordinates."""
 
+_LARGEST = 1e6
+
 
 class PlanarBase:
     """The base part in the frame of its first link; depends on the base joints alone.
@@ -157,16 +159,18 @@ def geometry(robot: RobotConfig, q: ArrayLike) -> Geometry:
         q: [x_h, y_h, z_h, R, P, Y, phi_1 .. phi_(n-1)], (n+5,) [m, rad].
 
     Raises:
-        ModelError: wrong shape, or not finite.
+        ModelError: wrong shape, not finite, or beyond +-1e6: no robot is 1000 km away, and an angle
+            of that size has lost the digits that place the links.
     """
     s = structure(robot)
     q = np.asarray(q, dtype=float)
     if q.shape != (s.n + 5,):
         raise ModelError(f"q has shape {q.shape}; expected ({s.n + 5},) for {s.n} links")
-    # The sum of squares is quicker; where it overflows, every component is looked at.
-    if not math.isfinite(q.dot(q)) and not np.isfinite(q).all():
-        bad = [i for i in range(len(q)) if not np.isfinite(q[i])]
-        raise ModelError(f"q is not finite at index {bad}")
+    # The norm is quicker, and silent where squares overflow; if large, look at every component.
+    if not math.hypot(*q.tolist()) < _LARGEST:
+        bad = [f"q[{i}] = {value:g}" for i, value in enumerate(q) if not abs(value) <= _LARGEST]
+        if bad:
+            raise ModelError(f"{', '.join(bad)}: give finite values, within +-{_LARGEST:g}")
     return Geometry(s, q, head_chain(s, q[6 : 6 + s.n_h].tolist()))
 
 

@@ -57,8 +57,10 @@ def test_one_state_from_standard_input_with_all_its_digits(monkeypatch, capsys):
         ('{"q": [1, 2]}', "state.q = '2 entries': give 17"),
         ("nonsense", "give valid JSON; line 1, column 1"),
         ('{"q": NaN}', "give a list of 17 numbers"),
+        (f'{{"q": {[0.0] * 11 + [1e308] * 6}}}', "q[11] = 1e+308, q[12] = 1e+308"),
     ],
 )
+@pytest.mark.filterwarnings("error")
 def test_bad_input_is_one_line_and_code_2(text, message, tmp_path, capsys):
     path = tmp_path / "q.json"
     path.write_text(text)

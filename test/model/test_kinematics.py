@@ -170,9 +170,21 @@ def test_long_robot_keeps_F_bar():
     ("q", "message"),
     [
         (np.zeros(16), r"shape \(16,\); expected \(17,\)"),
-        (np.where(np.arange(17) == 4, np.nan, 0.1), r"not finite at index \[4\]"),
+        (np.where(np.arange(17) == 4, np.nan, 0.1), r"^q\[4\] = nan: give finite values"),
+        (np.where(np.arange(17) == 0, 1e308, 0.1), r"^q\[0\] = 1e\+308: .* within \+-1e\+06"),
+        (np.where(np.arange(17) > 14, -1.1e6, 0.1), r"^q\[15\] = -1.1e\+06, q\[16\] = -1.1e\+06: "),
     ],
 )
+@pytest.mark.filterwarnings("error")
 def test_bad_posture(q, message):
     with pytest.raises(ModelError, match=message):
         geometry(PAPER, q)
+
+
+def test_a_large_posture_is_a_posture():
+    """Whole turns and a world of some hundred kilometres are nothing wrong."""
+    q = random_q(PAPER, 1)
+    far = q + np.where(np.arange(17) < 3, 9e5, 0.0)
+    np.testing.assert_allclose(
+        kinematics(geometry(PAPER, far)).F_bar, kinematics(geometry(PAPER, q)).F_bar
+    )
