@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from snake_control.config import ControllerConfig, RobotConfig
+from snake_control.config.presets import PRESETS
 from snake_control.control.reference import Reference
 from snake_control.control.scp_controller import ScpController
 from snake_control.plant.kinematic import KinematicPlant
@@ -135,3 +136,35 @@ def test_a_controller_leaves_a_straight_posture_by_itself():
         state = plant.step(result.u, 0.02)
     assert result.damping == 0.0
     assert np.abs(result.error).max() < 0.25
+
+
+FUZZED = {name: ROBOTS[name] for name in ("paper", "planar", "minimal head")}
+ANGLES = np.array([0.0, np.pi / 2, -np.pi / 2, np.pi, -np.pi, np.pi / 4])
+
+
+def right_angles(robot: RobotConfig, rng: np.random.Generator) -> np.ndarray:
+    """Some angles by chance, most of them right ones; often the base folded up on one spot."""
+    size = robot.links + 5
+    q = np.where(rng.random(size) < 0.1, rng.uniform(-np.pi, np.pi, size), rng.choice(ANGLES, size))
+    kind = rng.integers(4)
+    if kind == 0:
+        q[6 + robot.head_links :] = rng.choice([-np.pi, np.pi], size - 6 - robot.head_links)
+    elif kind == 1:
+        q[3:5] = 0.0
+    return q
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("preset", list(PRESETS))
+@pytest.mark.parametrize("case", [1, 2, 3])
+@pytest.mark.parametrize("robot", list(FUZZED.values()), ids=list(FUZZED))
+def test_right_angles_and_folded_up_bases(robot, case, preset):
+    controller = ScpController(robot, ControllerConfig(case=case, preset=preset))
+    rng = np.random.default_rng(7)
+    limits = np.array(robot.joint_speed_limits_rad_s)
+    for _ in range(60):
+        q = right_angles(robot, rng)
+        result = controller.step(q, None, Reference(q[:6] + AWAY, np.full(6, 0.05)), 0.0)
+        assert all_finite(result), q.tolist()
+        assert np.isfinite(result.singular_shape.nearness), q.tolist()
+        assert (np.abs(result.u) <= limits * (1 + 1e-12)).all(), q.tolist()
