@@ -25,8 +25,9 @@ _LARGEST_LOG = 345.0
 class Posture:
     """What cost functions and control laws read; gradients are by q, (n + 5,) each.
 
-    All of it is finite, also in singular postures: logarithms and V_b1 are kept within what doubles
-    hold, and logarithmic gradients are damped there (``snake_control.model.damping``).
+    All of it is finite, also in singular postures: log V_b1 is cut off at +-345 (so V_b1 is never
+    quite 0), and logarithmic gradients are damped there (``snake_control.model.damping``), which
+    does not make them 0: what stays regular keeps its part.
 
     Attributes:
         robot: the robot.
@@ -42,7 +43,7 @@ class Posture:
             q: [w, phi], (n + 5,) [m, rad].
 
         Raises:
-            ModelError: wrong shape, or not finite.
+            ModelError: wrong shape, not finite, or beyond +-1e6.
         """
         self.robot = robot
         self.g: Geometry = geometry(robot, q)
@@ -55,22 +56,36 @@ class Posture:
         B_tilde is block triangular and the base block has l on its diagonal, so it is |det head
         block| l^(n_b - m_b - 1); constant for a planar snake.
         """
-        s = self.k.s
-        half = self.robot.half_length_m
-        scale = half ** len(s.theta_b)
-        # Two rows of the head block were divided by l.
-        return scale if s.robot.planar else scale * self.k.head.determinant * half**2
+        return self._V_h_unit * self.head_determinant
 
     @property
     def V_h_by_head(self) -> list[float]:
         """Derivative of V_h by each head joint, n_h numbers: all that (25) needs."""
-        scale, by_joints, _ = self._V_h_parts
-        return [scale * value for value in by_joints]
+        return [self._V_h_unit * value for value in self.head_determinant_by_head]
 
     @lazy
     def V_h_gradient(self) -> Array:
         """Gradient of V_h; exact in singular postures, too."""
-        scale, by_joints, by_turning = self._V_h_parts
+        return self._V_h_unit * self.head_determinant_gradient
+
+    @property
+    def head_determinant(self) -> float:
+        """|det head block|, free of units, as ``HeadBlock`` has it; 1 for a planar snake.
+
+        V_h without the power of l, which leaves the range of numbers on long robots.
+        """
+        return 1.0 if self.robot.planar else self.k.head.determinant
+
+    @property
+    def head_determinant_by_head(self) -> list[float]:
+        """Derivative of ``head_determinant`` by each head joint, n_h numbers."""
+        scale, by_joints, _ = self._determinant_parts
+        return [scale * value for value in by_joints]
+
+    @property
+    def head_determinant_gradient(self) -> Array:
+        """Gradient of ``head_determinant``; exact in singular postures, too."""
+        scale, by_joints, by_turning = self._determinant_parts
         return scale * self._by_head(by_joints, by_turning)
 
     @lazy
@@ -78,13 +93,18 @@ class Posture:
         """Gradient of log V_h, damped near a singular head posture."""
         return self._by_head(*self._log_V_h_parts)
 
+    @property
+    def _V_h_unit(self) -> float:
+        half, driven = self.robot.half_length_m, len(self.k.s.theta_b)
+        # Two rows of the head block were divided by l.
+        return half**driven if self.robot.planar else half ** (driven + 2)
+
     @lazy
-    def _V_h_parts(self) -> tuple[float, list[float], Vector]:
-        """Derivative of V_h by head joints and by turning the base frame, after its factor."""
+    def _determinant_parts(self) -> tuple[float, list[float], Vector]:
+        """Derivative by head joints and by turning the base frame, after a common factor."""
         if self.k.damping == 0.0:
-            return self.V_h, *self._log_V_h_parts
-        scale = self.robot.half_length_m ** (2 + len(self.k.s.theta_b))
-        return scale, *self.k.head.gradient(self.k.head.cofactors)
+            return self.head_determinant, *self._log_V_h_parts
+        return 1.0, *self.k.head.gradient(self.k.head.cofactors)
 
     @lazy
     def _log_V_h_parts(self) -> tuple[list[float], Vector]:
@@ -94,7 +114,10 @@ class Posture:
 
     @lazy
     def log_V_b1(self) -> float:
-        """Logarithm of V_b1 (30); near a singular head posture that of the damping's threshold."""
+        """Logarithm of V_b1 (30), within +-345; -345, or a little more, where V_b1 is 0.
+
+        Near a singular head posture that of the damping's threshold.
+        """
         log = self._gram.log
         half = math.log(self.robot.half_length_m)
         if self.robot.planar:

@@ -9,8 +9,9 @@ from snake_control.model.posture import Posture
 class LogSingularity(SubTask):
     """V = log V_b1 (30), without unit.
 
-    The gradient grows as 1 / sigma_min towards a singular posture and is finite in every posture
-    that numbers can hold; where V_b1 is exactly 0 (V = -inf) it is 0.
+    V and its gradient are finite in every posture. The gradient grows as 1 / sigma_min towards a
+    singular one, down to the threshold of ``model/damping.py``, and shrinks below it. Where V_b1
+    is 0, round-off decides what V is, -345 at least; the gradient is that of what stays regular.
 
     It does not reliably keep a robot from turning singular: V_b1 also counts how much motions grow
     along the body, and may rise while the body folds up (docs/sub_tasks.md). ``WheelAxes`` looks at
@@ -18,7 +19,7 @@ class LogSingularity(SubTask):
     """
 
     def value(self, posture: Posture) -> float:
-        """Return log V_b1; -inf in a singular posture."""
+        """Return log V_b1, within +-345."""
         return posture.log_V_b1
 
     def gradient(self, posture: Posture) -> Array:

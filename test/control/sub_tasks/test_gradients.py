@@ -62,6 +62,12 @@ def test_gradient(name, robot, seed):
     assert found.shape == q.shape
     assert np.abs(found).max() > 0
     assert np.abs(found - expected).max() < 1e-5 * np.abs(expected).max()
+    # The parts that the composition reads are worked out by themselves in some sub-tasks.
+    n_h = robot.head_links
+    if name in HEAD_SUB_TASKS:
+        np.testing.assert_array_equal(task.by_head(Posture(robot, q)), found[6 : 6 + n_h])
+    if name in BASE_SUB_TASKS:
+        np.testing.assert_array_equal(task.by_base(Posture(robot, q)), found[6 + n_h :])
 
 
 def test_the_configuration_knows_the_same_names():
@@ -108,6 +114,23 @@ def test_the_largest_V_b1_has_a_finite_gradient():
     assert np.isfinite(make("singularity", robot, q).gradient(posture)).all()
 
 
+def test_log_manipulability_where_V_h_is_below_what_doubles_hold():
+    robot = RobotConfig(
+        links=200,
+        joint_axes=PAPER.joint_axes[:5] + ("yaw",) * 194,
+        half_length_m=0.01,
+        start_joint_angles_rad=(0.0,),
+    )
+    q = random_q(robot, 1)
+    task = make("log_manipulability", robot, q)
+    posture = Posture(robot, q)
+    assert posture.V_h == 0.0
+    expected = gradient(lambda x: task.value(Posture(robot, x)), q)
+    assert np.abs(expected).max() > 0.1
+    np.testing.assert_allclose(task.gradient(posture), expected, atol=1e-6)
+    np.testing.assert_array_equal(task.by_head(posture), task.gradient(posture)[6:11])
+
+
 def test_scale_free_forms_do_not_see_the_size():
     large = dataclasses.replace(
         PAPER,
@@ -129,6 +152,17 @@ def test_scale_free_forms_do_not_see_the_size():
             rtol=1e-6,
             atol=1e-9,
         )
+
+
+def test_log_singularity_in_singular_shapes_is_what_its_docstring_says():
+    for bend in (0.0, 0.3):
+        q = random_q(PAPER, 1)
+        q[11:] = bend
+        posture = Posture(PAPER, q)
+        task = make("log_singularity", PAPER, q)
+        assert -345.0 <= task.value(posture) < -50.0
+        found = task.gradient(posture)
+        assert 1.0 < np.abs(found).max() < 1e6
 
 
 def test_joint_range_acts_within_its_margin_alone():
