@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from snake_control.config import ControllerConfig, RobotConfig
 from snake_control.control.reference import Reference
 from snake_control.control.sub_tasks import Composition
-from snake_control.errors import ModelError, SingularError
+from snake_control.errors import ModelError
 from snake_control.model.damping import EPSILON, damped_reciprocals
 from snake_control.model.dynamics import Dynamics
 from snake_control.model.posture import Posture
@@ -120,8 +120,8 @@ class TorqueController:
                 orthogonal to the kernel, so that no other choice makes |tau| smaller.
 
         Raises:
-            ModelError: an argument has the wrong shape or is not finite.
-            SingularError: the answer is not finite.
+            ModelError: an argument has the wrong shape or is not finite, or so large that the
+                torques asked for are not finite.
         """
         del t
         s = self._s
@@ -144,7 +144,12 @@ class TorqueController:
         )
         wanted = reduced.M_tilde @ w_tilde_ddot + reduced.h_tilde
         if not np.isfinite(wanted).all():
-            raise SingularError("B_tilde", posture.k.sigma_min_B_tilde)
+            bad = np.flatnonzero(~np.isfinite(wanted)).tolist()
+            raise ModelError(
+                f"M_tilde w_tilde_ddot + h_tilde is not finite at index {bad}: "
+                f"largest rate in q_dot {np.abs(q_dot).max():.3g}, "
+                f"largest wanted acceleration {np.abs(w_tilde_ddot).max():.3g}"
+            )
         U, sigma, Vt = np.linalg.svd(reduced.E_tilde, full_matrices=False)
         tau = ((U.T @ wanted) * damped_reciprocals(sigma)) @ Vt
         tau_ker = np.zeros(s.n - 1)

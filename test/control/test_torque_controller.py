@@ -206,3 +206,16 @@ def test_bad_free_torques_are_refused():
     controller = TorqueController(PAPER, ControllerConfig(case=1))
     with pytest.raises(ModelError, match="11 finite"):
         controller.step(*of(state), table_1(0.0), 0.0, free_torques=np.zeros(10))
+
+
+@pytest.mark.parametrize("name", ["paper", "planar"])
+def test_motions_beyond_what_doubles_hold_are_named(name):
+    robot = ROBOTS[name]
+    q = random_q(robot, 1)
+    controller = TorqueController(robot, ControllerConfig(case=1))
+    reference = Reference(q[:6], np.zeros(6))
+    with (
+        pytest.raises(ModelError, match=r"h_tilde is not finite .* rate in q_dot 1e\+200"),
+        np.errstate(all="ignore"),
+    ):
+        controller.step(q, np.full(len(q), 1e200), reference, 0.0)
