@@ -23,6 +23,8 @@ Array = NDArray[np.float64]
 def constraint_rate(g: Geometry, q_dot: Array) -> Array:
     """Return G_dot, the time derivative of the constraint matrix along ``q_dot``.
 
+    The whole matrix, for readers and to check ``constraint_drift`` against, the quick one.
+
     Args:
         g: the posture.
         q_dot: rate of q, (n + 5,) [m/s, rad/s]; it need not fulfil the constraints.
@@ -52,7 +54,9 @@ def constraint_rate(g: Geometry, q_dot: Array) -> Array:
 def F_bar_rate(g: Geometry, k: Kinematics, q_dot: Array) -> Array:
     """Return the time derivative of F_bar (8) along ``q_dot``, as (19) needs it.
 
-    From B_tilde F_bar = A_tilde: B_tilde F_bar_dot = A_tilde_dot - B_tilde_dot F_bar.
+    From B_tilde F_bar = A_tilde: B_tilde F_bar_dot = A_tilde_dot - B_tilde_dot F_bar. The paper's
+    form, for readers and to check ``constraint_drift.F_bar_drift`` against, which gives its product
+    with w_tilde_dot at once.
 
     Returns:
         Shape of F_bar, (n - m - 1, 6 + m).

@@ -127,6 +127,8 @@ class Dynamics:
     def bar(self, posture: Posture, q_dot: ArrayLike) -> BarDynamics:
         """Return M_bar, h_bar and E_bar of (16), (17).
 
+        The paper's form, for readers and to check ``reduced`` against, which does without it.
+
         Raises:
             ModelError: q_dot has the wrong shape or is not finite.
         """

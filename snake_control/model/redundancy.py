@@ -69,6 +69,7 @@ class Kinematics:
         """Rows of B_tilde that only the head joints of theta_bar enter, 4 x 4.
 
         Rows: the first base link's wheels (Assumption 5), then the floor. A planar snake has none.
+        The paper's form, for readers and to check ``head`` against, the quick one.
         """
         return self.B_bar[np.ix_(self.s.head_rows, self.s.theta_h)]
 
@@ -84,6 +85,8 @@ class Kinematics:
 
     def solve_head(self, right: Array) -> Array:
         """Return the inverse of ``head_block``, damped where ``damping`` says so, times ``right``.
+
+        In the paper's units, for readers and for checks; the control path asks ``head`` itself.
 
         Args:
             right: rows as ``head_block``, (4, ...); no rows for a planar snake.
