@@ -49,6 +49,8 @@ def read_states(document: object, robot: RobotConfig) -> tuple[list[State], bool
     return [_state(document, "state", robot)], False
 
 
+# What is not finite is null in the output; warnings would say it once more.
+@np.errstate(over="ignore", invalid="ignore")
 def evaluate(config: Config, state: State) -> dict[str, Any]:
     """Return every model quantity at a state, ready for JSON.
 

@@ -51,6 +51,15 @@ def test_one_state_from_standard_input_with_all_its_digits(monkeypatch, capsys):
     assert (found["V_h"], found["V_b1"]) == (posture.V_h, posture.V_b1)
 
 
+@pytest.mark.filterwarnings("error")
+def test_what_overflows_is_null_and_nothing_is_said_of_it(tmp_path, capsys):
+    path = tmp_path / "q.json"
+    path.write_text(json.dumps({"q": paper_states()[0]["q"], "q_dot": [1e200] * 17}))
+    code, out, err = run(capsys, "--state", str(path))
+    assert (code, err) == (0, "")
+    assert set(strict(out)["h_tilde"]) == {None}
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
