@@ -7,6 +7,7 @@ Stamps are judged by ROS time; timers run on a steady clock, also under ``use_si
 
 from __future__ import annotations
 
+import contextlib
 import time
 from typing import Any
 
@@ -21,7 +22,7 @@ from std_srvs.srv import SetBool
 from snake_control.config import Config
 from snake_control.control.reference import Reference
 from snake_control.control.scp_controller import ScpController
-from snake_control.errors import ModelError
+from snake_control.errors import SnakeError
 from snake_control.model.rotation import unwrap_near
 from snake_control.nodes import markers, topics
 from snake_control.nodes.controller_messages import ControllerMessages, Step, judge, too_far
@@ -38,6 +39,9 @@ _STATUS_OF_FAULT = {
     Fault.STALE: ControllerState.STATUS_STALE,
     Fault.INVALID: ControllerState.STATUS_INVALID,
 }
+# What arithmetic raises where a posture, or a sub-task of somebody else's, has no answer.
+_NO_ANSWER = (SnakeError, ArithmeticError, np.linalg.LinAlgError)
+
 _GOOD = (ControllerState.STATUS_TRACKING, ControllerState.STATUS_LIMITED)
 
 
@@ -115,7 +119,14 @@ class ScpControllerNode(Node):
         step = self._step(self.get_clock().now().nanoseconds)
         self._command.publish(self._messages.command(step))
         elapsed = time.perf_counter() - started
-        self._state.publish(self._messages.state(step, self._case, elapsed))
+        try:
+            state = self._messages.state(step, self._case, elapsed)
+        except _NO_ANSWER as error:
+            # The state asks more of the posture than the command, which has gone: take it back.
+            _give_up(step, error)
+            self._command.publish(self._messages.command(step))
+            state = self._messages.state(step, self._case, elapsed)
+        self._state.publish(state)
         if step.status != self._status:
             self._status = step.status
             # On lines of their own: rclpy ties one severity to each line that logs.
@@ -168,11 +179,10 @@ class ScpControllerNode(Node):
         q = np.concatenate([step.w, step.phi])
         reference = Reference(step.w_d, step.w_d_dot)
         t = (self._steady.now().nanoseconds - self._origin_ns) * 1e-9
-        step.status = ControllerState.STATUS_FAULT
         try:
             result = self._controller.step(q, q_dot, reference, t)
-        except ModelError as error:
-            step.text = str(error)
+        except _NO_ANSWER as error:
+            _give_up(step, error)
             return
         if not np.isfinite(result.u).all():
             bad = [
@@ -180,6 +190,7 @@ class ScpControllerNode(Node):
                 for name, u in zip(self._robot.joint_names, result.u, strict=True)
                 if not np.isfinite(u)
             ]
+            step.status = ControllerState.STATUS_FAULT
             step.text = f"the control law gave no finite velocity for {', '.join(bad)}"
             return
         judge(step, result, self._robot)
@@ -192,7 +203,9 @@ class ScpControllerNode(Node):
         found = []
         if not self._head.problem(now) and not self._joint_states.problem(now):
             q = np.concatenate([self._head.value[0], self._joint_states.value[0]])
-            found += markers.robot_markers(self._robot, q, now, frame)
+            # A posture that the step refuses, and says so, cannot be drawn either.
+            with contextlib.suppress(*_NO_ANSWER):
+                found += markers.robot_markers(self._robot, q, now, frame)
         if not self._reference.problem(now):
             length = 4 * self._robot.half_length_m
             found.append(markers.reference_marker(self._reference.value.w_d, now, frame, length))
@@ -205,6 +218,13 @@ class ScpControllerNode(Node):
         self._command.publish(self._messages.command(Step.at(now, self._robot)))
         # A publisher that is destroyed may take what it has just sent along.
         self._command.wait_for_all_acked(_ACKNOWLEDGED_WITHIN)
+
+
+def _give_up(step: Step, error: Exception) -> None:
+    """Leave the joints at rest, with the reason."""
+    step.result = None
+    step.status = ControllerState.STATUS_FAULT
+    step.text = f"the control law has no answer: {error}"
 
 
 def main() -> int:

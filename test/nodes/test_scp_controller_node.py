@@ -1,6 +1,7 @@
 """The controller node on real DDS: what it commands, and that it commands zero when in doubt."""
 
 import math
+import os
 
 import numpy as np
 import pytest
@@ -272,6 +273,86 @@ def test_markers_show_robot_and_reference(rig):
     target = found["reference"].points[1]
     np.testing.assert_allclose([target.x, target.y, target.z], rig.table_1.w_d[:3], atol=1e-9)
     assert all(marker.header.frame_id == "world" for marker in found.values())
+
+
+def test_a_head_out_of_this_world_is_not_drawn(rig):
+    markers = rig.graph.subscribe(topics.MARKERS)
+    rig.head.pose.pose.position.x = 1e300
+    rig.wait_status(ControllerState.STATUS_ERROR_TOO_LARGE, what="the far head noticed")
+    rig.graph.wait_for(
+        lambda: markers.last and [marker.ns for marker in markers.last.markers] == ["reference"],
+        10.0,
+        "markers without the robot",
+    )
+    rig.repair()
+    rig.wait_status(*GOOD, what="tracking after the repair")
+
+
+def test_a_joint_that_has_turned_too_far_to_mean_anything_is_named(rig):
+    rig.joint_states.position[3] = 1e300
+    state = rig.wait_status(
+        ControllerState.STATUS_FAULT, what="the angle noticed", texts=["q[14] = 1e+300"]
+    )
+    assert is_zero(rig.command_of(state))
+    rig.repair()
+    rig.wait_status(*GOOD, what="tracking after the repair")
+
+
+SUB_TASKS_WITHOUT_ANSWER = """
+import numpy as np
+from snake_control.control.sub_tasks import SubTask
+
+class Divides(SubTask):
+    def value(self, posture):
+        return 0.0
+
+    def gradient(self, posture):
+        # They are tried at the start posture before they are taken.
+        if posture.g.q[0] > 1.0:
+            self.fail(posture)
+        return np.zeros(len(posture.g.q))
+
+    def fail(self, posture):
+        1.0 / self.value(posture)
+
+class Solves(Divides):
+    def fail(self, posture):
+        np.linalg.solve(np.zeros((17, 17)), posture.g.q)
+
+class Spoils(Divides):
+    def fail(self, posture):
+        posture.k.base
+        posture.g.middles[:] = np.nan
+"""
+
+
+def test_arithmetic_that_fails_stops_the_joints_and_not_the_node(tmp_path, monkeypatch):
+    """In the control law; or, with Spoils, in what the state says of the posture."""
+    (tmp_path / "no_answer.py").write_text(SUB_TASKS_WITHOUT_ANSWER)
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path), prepend=os.pathsep)
+    with Graph() as graph:
+        rig = ControllerRig(graph)
+        graph.start(NODE, params_files=[PAPER_ROBOT])
+        rig.w[0] += 2.0
+        rig.table_1.w_d[0] += 2.0
+        rig.repair()
+        rig.wait_status(*GOOD, what="tracking")
+        for name, text in (
+            ("Divides", "float division by zero"),
+            ("Solves", "Singular matrix"),
+            ("Spoils", "did not converge"),
+        ):
+            tasks = [f"no_answer:{name}"]
+            (result,) = graph.set_parameters(NODE, controller__base_sub_tasks=tasks).values()
+            assert result.successful, result.reason
+            state = rig.wait_status(
+                ControllerState.STATUS_FAULT, what=name, texts=["has no answer", text]
+            )
+            assert not np.any(state.u)
+            same = [c for c in rig.commands.messages if c.header.stamp == state.header.stamp]
+            assert is_zero(same[-1])
+        graph.set_parameters(NODE, controller__base_sub_tasks=["fall"])
+        rig.wait_status(*GOOD, what="tracking again")
 
 
 def test_speed_limit_is_named():
