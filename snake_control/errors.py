@@ -68,6 +68,22 @@ class SingularError(SnakeError, ArithmeticError):
         super().__init__(f"{matrix} is singular: smallest singular value {sigma_min:.3g}")
 
 
+class SubTaskError(SnakeError, RuntimeError):
+    """A sub-task of somebody else's raised an error or gave an answer of the wrong form.
+
+    Attributes:
+        name: ``package.module:Class``.
+        method: which of its methods.
+        reason: the error that it raised, or what is wrong with its answer.
+    """
+
+    def __init__(self, name: str, method: str, reason: str) -> None:
+        self.name = name
+        self.method = method
+        self.reason = reason
+        super().__init__(f"sub-task {name}, {method} fails: {reason}")
+
+
 class BusError(SnakeError, OSError):
     """The serial port cannot be opened or stopped working."""
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import sys
+import textwrap
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -21,3 +24,19 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     for item in items:
         if item.path.relative_to(here).parts[0] in _REAL_TIME:
             item.add_marker(pytest.mark.flaky(reruns=1))
+
+
+@pytest.fixture
+def own_package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[str], None]]:
+    """Write the text of ``my_package.my_module``, which is importable during the test."""
+    monkeypatch.syspath_prepend(tmp_path)
+    directory = tmp_path / "my_package"
+    directory.mkdir()
+    (directory / "__init__.py").write_text("")
+
+    def write(text: str) -> None:
+        (directory / "my_module.py").write_text(textwrap.dedent(text))
+
+    yield write
+    for name in [name for name in sys.modules if name.partition(".")[0] == "my_package"]:
+        del sys.modules[name]

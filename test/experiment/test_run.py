@@ -7,10 +7,12 @@ import dataclasses
 import numpy as np
 import pytest
 
+from snake_control.config import ControllerConfig
 from snake_control.experiment.cases import case_files, load_case
 from snake_control.experiment.facts import Facts
 from snake_control.experiment.run import AFTER_FALL_S, Settings, run_case
 from snake_control.experiment.series import Series
+from support.own_sub_tasks import LATE
 from support.robots import CONFIG
 from support.runs import paper_run
 
@@ -106,6 +108,18 @@ def test_torques_held_too_long_end_the_run_in_words():
     run = run_case(load_case((), 3), Settings(duration_s=5.0, rate_hz=20.0, controller="torque"))
     assert run.summary["ended"].startswith("no answer after")
     assert len(run.series) > 0
+
+
+def test_a_sub_task_of_somebody_else_s_that_fails_ends_the_run_in_words(tmp_path, own_package):
+    own_package(LATE)
+    config = load_case((), 3)
+    gains = ControllerConfig(base_sub_tasks=("my_package.my_module:Late",))
+    path = tmp_path / "series.csv"
+    run = run_case(dataclasses.replace(config, controller=gains), SHORT, path)
+    assert run.summary["ended"].startswith("no answer after 0.")
+    assert "sub-task my_package.my_module:Late, gradient fails: KeyError" in run.summary["ended"]
+    assert not run.interrupted
+    assert 0 < len(Series.read(path, config.robot)) == len(run.series) < 21
 
 
 def test_planar_snake_runs():

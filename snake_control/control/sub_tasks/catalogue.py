@@ -11,6 +11,7 @@ import numpy as np
 
 from snake_control.config import ControllerConfig, RobotConfig
 from snake_control.control.sub_tasks.fall import Fall
+from snake_control.control.sub_tasks.guard import GuardedSubTask
 from snake_control.control.sub_tasks.joint_range import JointRange
 from snake_control.control.sub_tasks.log_manipulability import LogManipulability
 from snake_control.control.sub_tasks.log_singularity import LogSingularity
@@ -20,7 +21,7 @@ from snake_control.control.sub_tasks.relative_fall import RelativeFall
 from snake_control.control.sub_tasks.singularity import Singularity
 from snake_control.control.sub_tasks.sub_task import SubTask
 from snake_control.control.sub_tasks.wheel_axes import WheelAxes
-from snake_control.errors import ConfigError, SnakeError
+from snake_control.errors import ConfigError, SnakeError, SubTaskError
 from snake_control.model.floor import head_pose_on_floor
 from snake_control.model.posture import Posture
 
@@ -50,19 +51,23 @@ def make(field: str, name: str, robot: RobotConfig, controller: ControllerConfig
 
     Raises:
         ConfigError: there is no such module or class, it is no ``SubTask``, it cannot be made, or
-            its answer for the start posture has the wrong form.
+            its answer for the start posture has the wrong form. Later answers of a class of
+            somebody else's raise ``SubTaskError`` where they are no answers.
     """
     if name in BUILT_IN:
         return BUILT_IN[name](robot, controller)
     found = _imported(field, name)
     try:
-        task = found(robot, controller)
-        _try(task, robot)
+        task = GuardedSubTask(name, found(robot, controller), robot, controller)
     except ConfigError:
         raise
     # Foreign code may raise anything; its own error stays attached.
     except Exception as error:
         raise ConfigError(field, name, f"it fails: {type(error).__name__}: {error}") from error
+    try:
+        _try(task, robot)
+    except SubTaskError as error:
+        raise ConfigError(field, name, f"{error.method} fails: {error.reason}") from error
     return task
 
 
@@ -89,15 +94,19 @@ def _imported(field: str, name: str) -> type[SubTask]:
 
 
 def _try(task: SubTask, robot: RobotConfig) -> None:
-    """Ask for value and gradient once, so that a wrong form shows before the robot moves."""
+    """Ask for every answer once, so that a wrong form shows before the robot moves.
+
+    Raises:
+        SubTaskError: an answer fails or has the wrong form.
+    """
     phi = np.array(robot.start_joint_angles_rad)
     q = np.concatenate((head_pose_on_floor(robot, phi, np.zeros(3)), phi))
     posture = Posture(robot, q)
-    try:
-        float(task.value(posture))
-        gradient = np.asarray(task.gradient(posture), dtype=float)
-    except SnakeError:
-        # A start posture may be singular; that says nothing about the sub-task.
-        return
-    if gradient.shape != q.shape:
-        raise ValueError(f"its gradient has shape {gradient.shape}, it must have {q.shape}")
+    for answer in (task.value, task.gradient, task.by_head, task.by_base):
+        try:
+            answer(posture)
+        except SubTaskError:
+            raise
+        except SnakeError:
+            # A start posture may be singular; that says nothing about the sub-task.
+            continue
