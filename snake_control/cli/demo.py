@@ -14,8 +14,7 @@ import signal
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import FrameType
 from typing import Any
@@ -26,15 +25,9 @@ from rclpy.signals import SignalHandlerOptions
 from snake_interfaces.msg import BusState, ControllerState, PoseStatus
 from std_srvs.srv import SetBool, Trigger
 
+from snake_control.cli.common import EXIT_FAILED, EXIT_OK, EXIT_USAGE, ending_signals
 from snake_control.cli.demo_arguments import DemoArguments, parse_arguments
-from snake_control.cli.demo_outcome import (
-    EXIT_FAILED,
-    EXIT_OK,
-    EXIT_USAGE,
-    Outcome,
-    RunJudge,
-    progress_text,
-)
+from snake_control.cli.demo_outcome import Outcome, RunJudge, progress_text
 from snake_control.cli.node_processes import NodeProcesses
 from snake_control.cli.progress import ProgressLine
 from snake_control.cli.ros_domain import own_domain
@@ -339,7 +332,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     with own_domain(), tempfile.TemporaryDirectory(prefix="snake_control_demo_") as directory:
         demo = Demo(arguments, config, Path(directory))
         # Also while the results are written: a second Ctrl-C must not lose them.
-        with _signals(demo.on_signal):
+        with ending_signals(demo.on_signal):
             try:
                 outcome = demo.run()
             finally:
@@ -388,16 +381,6 @@ def _has_inputs(controller: ControllerState | None) -> bool:
         and math.isfinite(controller.joint_states_age)
         and math.isfinite(controller.head_age)
     )
-
-
-@contextmanager
-def _signals(handler: Callable[[int, FrameType | None], None]) -> Iterator[None]:
-    before = {number: signal.signal(number, handler) for number in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        yield
-    finally:
-        for number, old in before.items():
-            signal.signal(number, old)
 
 
 if __name__ == "__main__":

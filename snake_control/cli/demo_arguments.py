@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from snake_control.cli.checked import natural, positive
+from snake_control.cli.common import add_params_file
 from snake_control.config import Config, load
 from snake_control.experiment.cases import CASES, case_files, config_directory
 from snake_control.experiment.parameters import configuration_parameters
@@ -103,13 +104,8 @@ def parse_arguments(argv: Sequence[str] | None = None) -> DemoArguments:
         "--seed", type=natural, metavar="N", help="of the mock's noise; default: its configuration"
     )
     parser.add_argument("--out", type=Path, default=Path("out/demo"), metavar="DIR")
-    parser.add_argument(
-        "--params-file",
-        type=Path,
-        action="append",
-        default=[],
-        metavar="F",
-        help="read after the paper's robot, the mock and the case; may be given several times",
+    add_params_file(
+        parser, "read after the paper's robot, the mock and the case; may be given several times"
     )
     parser.add_argument(
         "--no-noise", action="store_true", help="motion capture without noise (delay stays)"

@@ -7,9 +7,8 @@ import math
 
 import numpy as np
 
+from snake_control.cli.common import EXIT_FAILED, EXIT_OK
 from snake_control.experiment.series import Step
-
-EXIT_OK, EXIT_FAILED, EXIT_USAGE = 0, 1, 2
 
 FOLLOWING = ("tracking", "limited")
 """Status words of a controller that follows its reference."""

@@ -16,12 +16,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from snake_control.cli.common import EXIT_OK, EXIT_USAGE, add_params_file
 from snake_control.config import Config
 from snake_control.errors import ConfigError, SnakeError
 from snake_control.experiment.cases import load_case
 from snake_control.experiment.evaluation import evaluate, read_states
-
-EXIT_OK, EXIT_USAGE = 0, 2
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -78,15 +77,7 @@ def _parse(argv: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         prog="evaluate", description="Every model quantity at a state, as JSON on standard output."
     )
-    parser.add_argument(
-        "--params-file",
-        type=Path,
-        action="append",
-        default=[],
-        metavar="F",
-        help="ROS parameter file; may be given several times, later ones win; default: the "
-        "paper's robot",
-    )
+    add_params_file(parser)
     parser.add_argument(
         "--state",
         required=True,

@@ -10,16 +10,15 @@ against what came out.
 from __future__ import annotations
 
 import json
-import signal
 import sys
 import time
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from types import FrameType
 
 from tqdm import tqdm
 
+from snake_control.cli.common import EXIT_FAILED, EXIT_OK, EXIT_USAGE, ending_signals
 from snake_control.cli.experiment_arguments import ExperimentArguments, parse_arguments
 from snake_control.config import Config
 from snake_control.errors import SnakeError
@@ -27,8 +26,6 @@ from snake_control.experiment.run import CaseRun, run_case
 from snake_control.experiment.series import Step
 from snake_control.experiment.summary import write_summary
 from snake_control.experiment.table import format_summary
-
-EXIT_OK, EXIT_FAILED, EXIT_USAGE = 0, 1, 2
 
 
 class _Stop:
@@ -58,7 +55,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(f"cannot write to {arguments.out}: {error}", file=sys.stderr)
         return EXIT_USAGE
     stop = _Stop()
-    with _signals(stop):
+    with ending_signals(stop):
         try:
             if arguments.internal_motion:
                 _internal_motion(configurations[0], arguments.out)
@@ -154,16 +151,6 @@ def _internal_motion(config: Config, out: Path) -> None:
     for motion in motions:
         print(describe(motion))
     print(path)
-
-
-@contextmanager
-def _signals(handler: _Stop) -> Iterator[None]:
-    before = {number: signal.signal(number, handler) for number in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        yield
-    finally:
-        for number, old in before.items():
-            signal.signal(number, old)
 
 
 if __name__ == "__main__":

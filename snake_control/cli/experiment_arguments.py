@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from snake_control.cli.checked import positive
+from snake_control.cli.common import add_params_file
 from snake_control.config import Config
 from snake_control.experiment.cases import CASES, load_case
 from snake_control.experiment.run import CONTROLLERS, SERVOS, TORQUE_RATE_HZ, Settings
@@ -101,15 +102,7 @@ def parse_arguments(argv: Sequence[str] | None = None) -> ExperimentArguments:
         description="The paper's experiment in lockstep: no ROS, no clock, the same numbers "
         "every time. Writes summary.json, series.csv, the paper's figures and report.html.",
     )
-    parser.add_argument(
-        "--params-file",
-        type=Path,
-        action="append",
-        default=[],
-        metavar="F",
-        help="ROS parameter file; may be given several times, later ones win; default: the "
-        "paper's robot",
-    )
+    add_params_file(parser)
     parser.add_argument(
         "--case",
         type=_cases,
@@ -189,9 +182,11 @@ def _cases(text: str) -> tuple[int, ...]:
     if text == "all":
         return CASES
     try:
-        cases = sorted({int(part) for part in text.split(",")})
+        cases = sorted(int(part) for part in text.split(","))
     except ValueError:
         cases = []
+    if len(set(cases)) < len(cases):
+        raise argparse.ArgumentTypeError(f"{text!r} has a case twice")
     if not cases or not set(cases) <= set(CASES):
         raise argparse.ArgumentTypeError(f"{text!r} is not 1, 2, 3, a list like 1,3, or all")
     return tuple(cases)

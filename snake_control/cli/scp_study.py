@@ -6,6 +6,7 @@ ros2 run snake_control scp_study --params-file config/paper_robot.yaml --out out
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import os
 import sys
 from collections.abc import Sequence
@@ -13,13 +14,17 @@ from pathlib import Path
 
 from tqdm import tqdm
 
-from snake_control.cli.checked import natural, positive
+from snake_control.cli.checked import counting, natural, network_address, positive
+from snake_control.cli.common import EXIT_FAILED, EXIT_OK, EXIT_USAGE, add_params_file
 from snake_control.config import Config, load
+from snake_control.control.scp_controller import ScpController
 from snake_control.errors import SnakeError
 from snake_control.experiment.cases import config_directory
 from snake_control.experiment.study.candidates import Candidate, admissible, sample
 from snake_control.experiment.study.figure import draw
+from snake_control.experiment.study.gains import gains_text, scale_free
 from snake_control.experiment.study.ranking import (
+    Ranked,
     format_ranking,
     ranking,
     verdict,
@@ -31,21 +36,24 @@ from snake_control.experiment.study.trajectories import (
     built_in,
     read_trajectories,
 )
-from snake_control.experiment.study.trial import Outcome, Trial
+from snake_control.experiment.study.trial import Outcome, Trial, settled_from_s, transient_s
 from snake_control.experiment.study.workers import run_in_processes, run_on_dask
 
-EXIT_OK, EXIT_FAILED, EXIT_USAGE, EXIT_INTERRUPTED = 0, 1, 2, 130
+EXIT_INTERRUPTED = 130
+
+# Fewer steps than this show nothing of a motion.
+_LEAST_STEPS = 10
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the study; return its exit code.
 
-    0: done; 1: a trial or the cluster failed; 2: bad arguments or configuration; 130: Ctrl-C (what
-    was done is kept, and the next call goes on from there).
+    0: done; 1: some run failed (the others are ranked), or the cluster did; 2: bad arguments or
+    configuration; 130: Ctrl-C (what was done is kept, and the next call goes on from there).
     """
-    given = _parser().parse_args(argv)
+    given = _parsed(argv)
     try:
-        config = load(*(given.params_file or [config_directory() / "paper_robot.yaml"]))
+        config = _config(given)
         trials = _trials(config, given)
         given.out.mkdir(parents=True, exist_ok=True)
         store_path = given.out / "outcomes.jsonl"
@@ -53,9 +61,11 @@ def main(argv: Sequence[str] | None = None) -> int:
             store_path.unlink(missing_ok=True)
         store = OutcomeStore(store_path)
     except (SnakeError, OSError) as error:
-        print(f"scp_study: {error}", file=sys.stderr)
+        print(f"scp_study: {' '.join(str(error).split())}", file=sys.stderr)
         return EXIT_USAGE
     chosen = Candidate.of(config.robot)
+    print(f"gains: {gains_text(config.controller)}")
+    settled = _says_settled(config, given.duration)
     try:
         _run(trials, store, given)
         code = EXIT_OK
@@ -67,18 +77,41 @@ def main(argv: Sequence[str] | None = None) -> int:
         return EXIT_FAILED
     outcomes = _complete(trials, store)
     if outcomes:
-        _write_results(outcomes, chosen, given.out)
+        _write_results(ranking(outcomes, settled), chosen, given.out)
+    if code == EXIT_OK and any(outcome.failed for outcome in outcomes):
+        code = EXIT_FAILED
     return code
 
 
-def _parser() -> argparse.ArgumentParser:
+def _config(given: argparse.Namespace) -> Config:
+    config = load(*(given.params_file or [config_directory() / "paper_robot.yaml"]))
+    if not given.own_gains:
+        config = dataclasses.replace(config, controller=scale_free(config.controller))
+    # Made once here, so that a sub-task that cannot be made shows before the workers start.
+    ScpController(config.robot, config.controller)
+    return config
+
+
+def _says_settled(config: Config, duration_s: float) -> bool:
+    """Return whether the runs are long enough to judge tracking; say so if they are not."""
+    transient = transient_s(config.robot, config.controller)
+    if settled_from_s(duration_s) >= transient:
+        return True
+    print(
+        f"tracking is not judged: the head is on its way to the reference for {transient:g} s, and "
+        f"the last third of {duration_s:g} s begins before; it takes {1.5 * transient:g} s"
+    )
+    return False
+
+
+def _parsed(argv: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="scp_study", description=(__doc__ or "").splitlines()[0])
+    add_params_file(parser, "the robot and its controller, later files win; default: the paper's")
     parser.add_argument(
-        "--params-file",
-        type=Path,
-        action="append",
-        metavar="F",
-        help="the robot and its controller, later files win; default: the paper's",
+        "--own-gains",
+        action="store_true",
+        help="the files' gains as they are; without it gains of the paper's kind are replaced by "
+        "the preset scale_free, which fits every choice alike",
     )
     parser.add_argument("--out", type=Path, default=Path("out/study"), metavar="DIR")
     parser.add_argument(
@@ -100,21 +133,27 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         "--sample",
-        type=natural,
+        type=counting,
         metavar="N",
         help="try N choices drawn at random (and the configured one), not all",
     )
     parser.add_argument("--seed", type=natural, default=0, metavar="N", help="of the sample")
     parser.add_argument(
-        "--workers", type=natural, default=os.cpu_count() or 1, metavar="N", help="processes"
+        "--workers", type=counting, default=os.cpu_count() or 1, metavar="N", help="processes"
     )
     parser.add_argument(
-        "--scheduler", metavar="ADDRESS", help="run on this Dask cluster, such as tcp://host:8786"
+        "--scheduler",
+        type=network_address,
+        metavar="ADDRESS",
+        help="run on this Dask cluster, such as tcp://host:8786",
     )
     parser.add_argument(
         "--fresh", action="store_true", help="forget outcomes of earlier calls in --out"
     )
-    return parser
+    given = parser.parse_args(argv)
+    if given.dt > given.duration / _LEAST_STEPS:
+        parser.error(f"--dt {given.dt:g} leaves fewer than {_LEAST_STEPS} steps of --duration")
+    return given
 
 
 def _trials(config: Config, given: argparse.Namespace) -> list[Trial]:
@@ -135,7 +174,8 @@ def _trials(config: Config, given: argparse.Namespace) -> list[Trial]:
 
 
 def _run(trials: Sequence[Trial], store: OutcomeStore, given: argparse.Namespace) -> None:
-    missing = [trial for trial in trials if trial.key not in store]
+    # What failed is tried again: the code that failed is no part of a trial's key.
+    missing = [t for t in trials if t.key not in store or store[t.key].failed is not None]
     kept = len(trials) - len(missing)
     names = len({trial.trajectory.name for trial in trials})
     print(
@@ -147,7 +187,7 @@ def _run(trials: Sequence[Trial], store: OutcomeStore, given: argparse.Namespace
     done = (
         run_on_dask(missing, given.scheduler)
         if given.scheduler
-        else run_in_processes(missing, max(1, given.workers))
+        else run_in_processes(missing, given.workers)
     )
     with tqdm(total=len(trials), initial=kept, desc="runs", mininterval=1.0) as progress:
         for trial, outcome in done:
@@ -168,8 +208,7 @@ def _complete(trials: Sequence[Trial], store: OutcomeStore) -> list[Outcome]:
     ]
 
 
-def _write_results(outcomes: Sequence[Outcome], chosen: Candidate, out: Path) -> None:
-    rows = ranking(outcomes)
+def _write_results(rows: Sequence[Ranked], chosen: Candidate, out: Path) -> None:
     text = f"{format_ranking(rows, chosen)}\n\n{verdict(rows, chosen)}\n"
     (out / "ranking.txt").write_text(text, encoding="utf-8")
     write_csv(rows, out / "ranking.csv")

@@ -46,7 +46,8 @@ def read_yaml(path: str | Path) -> Any:
         raise ConfigFileError(str(path), "is no text in UTF-8") from error
     try:
         return yaml.load(text, Loader=_RclLoader)
-    except yaml.YAMLError as error:
+    # PyYAML lets errors of what it makes through, such as that of a month 13.
+    except (yaml.YAMLError, ValueError) as error:
         raise ConfigFileError(str(path), f"is not valid YAML: {error}") from error
 
 
@@ -77,7 +78,7 @@ def read_value(field: str, text: str) -> Any:
     """
     try:
         value = yaml.load(text, Loader=_RclLoader)
-    except yaml.YAMLError as error:
+    except (yaml.YAMLError, ValueError) as error:
         raise ConfigError(field, text, "give a value in YAML") from error
     _check_as_rcl(field, value)
     return value

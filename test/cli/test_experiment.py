@@ -89,6 +89,7 @@ def test_internal_motion_is_drawn(tmp_path, capsys):
     [
         ["--case", "4"],
         ["--case", "1,x"],
+        ["--case", "1,1"],
         ["--duration", "0"],
         ["--rate", "0.5"],
         ["--plant-step", "nan"],

@@ -9,7 +9,10 @@ import sys
 from pathlib import Path
 
 import pytest
+import yaml
 
+from snake_control.cli.scp_study import main
+from support.own_sub_tasks import LATE
 from support.process import Process
 from support.waiting import wait_for
 
@@ -108,20 +111,79 @@ def test_on_a_dask_cluster(tmp_path):
     [
         (("--params-file", "nowhere.yaml"), "nowhere.yaml: cannot be read"),
         (("--trajectories", "nowhere.yaml"), "nowhere.yaml: cannot be read"),
+        (("--trajectories", "{tmp}/broken.yaml"), "broken.yaml: is not valid YAML"),
+        (("--wheelless", "99"), "no choice with 99 of the links 6 to 11 wheelless"),
+        (("--params-file", "{tmp}/own.yaml"), "cannot import nowhere"),
     ],
 )
-def test_a_mistake_gets_one_line_and_code_2(tmp_path, arguments, words):
-    done = run(tmp_path, *arguments)
-    assert done.returncode == 2
-    assert words in done.stderr
-    assert len(done.stderr.splitlines()) == 1
+def test_a_mistake_gets_one_line_and_code_2(tmp_path, capsys, arguments, words):
+    (tmp_path / "broken.yaml").write_text("a: [\n")
+    parameters = {"controller": {"base_sub_tasks": ["nowhere:Mine"]}}
+    (tmp_path / "own.yaml").write_text(yaml.dump({"/**": {"ros__parameters": parameters}}))
+    given = [each.format(tmp=tmp_path) for each in arguments]
+    assert main(["--out", str(tmp_path / "out"), *given]) == 2
+    shown = capsys.readouterr()
+    assert words in shown.err
+    assert len(shown.err.splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        ("--scheduler", "nope"),
+        ("--scheduler", "tcp://host"),
+        ("--sample", "0"),
+        ("--workers", "0"),
+        ("--dt", "7"),
+    ],
+)
+def test_wrong_command_lines_end_with_usage(tmp_path, capsys, wrong):
+    with pytest.raises(SystemExit) as caught:
+        main(["--out", str(tmp_path), *wrong])
+    assert caught.value.code == 2
+    assert wrong[0] in capsys.readouterr().err
+
+
+def test_gains_are_scale_free_unless_the_files_own_are_wanted(tmp_path):
+    # Its file has a weight of its own for the paper's preset.
+    planar = ("--params-file", "config/planar_snake.yaml", "--duration", "0.4", "--sample", "1")
+    done = run(tmp_path, *planar)
+    assert done.returncode == 0, done.stderr
+    assert "gains: preset scale_free: head log_manipulability" in done.stdout
+    assert "tracking is not judged: the head is on its way" in done.stdout
+    own = run(tmp_path, *planar, "--own-gains")
+    assert "gains: preset paper: head manipulability 100000; base singularity 1.3e-12" in own.stdout
+    assert ", 0 of them done before" in own.stdout
+
+
+def test_a_sub_task_that_fails_is_counted_and_tried_again(tmp_path, own_package):
+    own_package(LATE)
+    parameters = {"controller": {"base_sub_tasks": ["my_package.my_module:Late"]}}
+    (tmp_path / "own.yaml").write_text(yaml.dump({"/**": {"ros__parameters": parameters}}))
+    path = os.pathsep.join((str(tmp_path), *sys.path))
+    for _ in range(2):
+        done = subprocess.run(
+            command(tmp_path / "out", "--params-file", str(tmp_path / "own.yaml"), *SHORT),
+            cwd=ROOT,
+            env=os.environ | {"PYTHONPATH": path},
+            capture_output=True,
+            text=True,
+            timeout=100,
+            check=False,
+        )
+        assert done.returncode == 1
+        assert "Traceback" not in done.stderr
+        assert ", 0 of them done before" in done.stdout
+        assert "could not be run to the end on 3 of the trajectories" in done.stdout
+        assert "my_module:Late, gradient fails: KeyError: 'gone'" in done.stdout
 
 
 def test_a_scheduler_that_is_not_there_is_named(tmp_path):
     pytest.importorskip("distributed")
     done = run(tmp_path, *SHORT, "--scheduler", "tcp://127.0.0.1:9")
     assert done.returncode == 1
-    assert "no Dask scheduler answers at tcp://127.0.0.1:9" in done.stderr
+    assert "no Dask scheduler answers at tcp://127.0.0.1:9" in done.stderr.splitlines()[-1]
+    assert "Exception ignored" not in done.stderr
 
 
 def _children(pid: int) -> list[int]:

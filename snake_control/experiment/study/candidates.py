@@ -54,7 +54,7 @@ def admissible(
         wheelless_counts: only sets of these sizes; all sizes by default.
 
     Raises:
-        StudyError: there are more than ``MOST_CANDIDATES`` to look at.
+        StudyError: there are more than ``MOST_CANDIDATES`` to look at, or none.
     """
     free_links = list(range(max(template.head_links, 1) + 1, template.links))
     if wheelless_counts is None:
@@ -70,7 +70,14 @@ def admissible(
             f"{total} sets of SCPs are too many to list (at most {MOST_CANDIDATES}); "
             "give the numbers of wheelless links to look at"
         )
-    return sorted(_allowed(template, free_links, counts, heads))
+    found = sorted(_allowed(template, free_links, counts, heads))
+    if not found:
+        numbers = ", ".join(map(str, counts))
+        raise StudyError(
+            f"no choice with {numbers} of the links {free_links[0]} to {free_links[-1]} wheelless "
+            "fulfils the paper's conditions"
+        )
+    return found
 
 
 def sample(candidates: Sequence[Candidate], count: int, seed: int) -> list[Candidate]:

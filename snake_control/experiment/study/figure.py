@@ -19,6 +19,7 @@ _COLORS = {
     "came near a singular shape": style.PURPLE,
     "lost its reference": style.ORANGE,
     "fell": style.VERMILION,
+    "failed": style.SKY_BLUE,
 }
 
 
@@ -42,7 +43,8 @@ def draw(rows: Sequence[Ranked], chosen: Candidate, path: Path) -> None:
         _scatter(right, singular, tracking, rows, chosen)
         left.set_xlabel("least $d_{min}$ [mm] (more is safer)")
         right.set_xlabel("nearest to a singular shape, 0..1 (less is safer)")
-        left.set_ylabel("tracking error [mm rms]")
+        settled = all(row.lost is not None for row in rows)
+        left.set_ylabel("tracking error [mm rms]" + ("" if settled else ", not settled"))
         left.set_yscale("log")
         right.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
         figure.savefig(path)
@@ -81,6 +83,8 @@ def _scatter(
 
 
 def _kind(row: Ranked) -> str:
+    if row.failed:
+        return "failed"
     if row.falls:
         return "fell"
     if row.lost:

@@ -14,7 +14,10 @@ from snake_control.experiment.study.trial import Outcome
 
 
 class OutcomeStore:
-    """A file of outcomes by the key of their trial; every line is written at once."""
+    """A file of outcomes by the key of their trial; every line is written at once.
+
+    Of several lines with one key the last counts: a trial that failed may be tried again.
+    """
 
     def __init__(self, path: Path) -> None:
         """Open a store, reading what is there.

@@ -8,9 +8,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from snake_control.config import RobotConfig
+from snake_control.config.yaml_file import read_yaml
 from snake_control.errors import ConfigError, ConfigFileError
 from snake_control.trajectory.arc import Arc
 from snake_control.trajectory.head_trajectory import HeadTrajectory
@@ -75,12 +74,7 @@ def read_trajectories(path: str | Path) -> list[StudyTrajectory]:
         ConfigFileError: the file cannot be read, or is no map.
         ConfigError: names the field that is wrong and what is allowed.
     """
-    try:
-        tree = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ConfigFileError(str(path), f"cannot be read: {error.strerror}") from error
-    except yaml.YAMLError as error:
-        raise ConfigFileError(str(path), f"is not valid YAML: {error}") from error
+    tree = read_yaml(path)
     if not isinstance(tree, Mapping) or not tree:
         raise ConfigFileError(str(path), "expected a map from names to trajectories")
     return [_trajectory(str(name), fields) for name, fields in tree.items()]
@@ -91,7 +85,7 @@ def _trajectory(name: str, fields: Any) -> StudyTrajectory:
         raise ConfigError(name, fields, "give a map with kind, start_pose, ...")
     measures = {"line": ("velocity",), "arc": ("speed_m_s", "radius_m")}
     kind = fields.get("kind")
-    if kind not in measures:
+    if not isinstance(kind, str) or kind not in measures:
         raise ConfigError(f"{name}.kind", kind, f"allowed: {', '.join(measures)}")
     allowed = ("kind", "start_pose", *measures[kind])
     for key in fields:
@@ -117,10 +111,9 @@ def _six(field: str, values: Any) -> tuple[float, ...]:
 
 
 def _number(field: str, value: Any) -> float:
-    # PyYAML reads 1e-3 as a text.
     try:
-        number = float(value) if isinstance(value, int | float | str) else math.nan
-    except ValueError:
+        number = float(value) if isinstance(value, int | float) else math.nan
+    except OverflowError:
         number = math.nan
     if isinstance(value, bool) or not math.isfinite(number):
         raise ConfigError(field, value, "give a finite number")

@@ -11,6 +11,7 @@ import numpy as np
 
 from snake_control.config import ControllerConfig, RobotConfig
 from snake_control.control.scp_controller import ScpController
+from snake_control.errors import SnakeError
 from snake_control.experiment.lockstep import lockstep
 from snake_control.experiment.study.candidates import Candidate
 from snake_control.experiment.study.trajectories import StudyTrajectory
@@ -19,7 +20,7 @@ from snake_control.model.singular_shape import singular_shape
 from snake_control.model.structure import structure
 from snake_control.plant.kinematic import KinematicPlant
 
-_FORMAT = 1
+_FORMAT = 2
 """Of a stored outcome; raised when the same trial would be judged otherwise."""
 
 
@@ -65,6 +66,8 @@ class Outcome:
         min_d_min_m: least margin against falling.
         peak_speed_rad_s: largest joint speed asked for before limiting, after the run-in.
         range_steps: share of control steps with a joint at the end of its range, 0..1.
+        failed: why the trial could not be run to its end, ``None`` if it could; the errors are
+            infinite then, and the rest is what was seen before.
     """
 
     candidate: Candidate
@@ -76,6 +79,7 @@ class Outcome:
     min_d_min_m: float
     peak_speed_rad_s: float
     range_steps: float
+    failed: str | None = None
 
     @property
     def fell(self) -> bool:
@@ -87,49 +91,89 @@ RUN_IN_S = 5.0
 """The first seconds carry the way from w(0) to w_d(0), which all candidates share."""
 
 
+def transient_s(robot: RobotConfig, controller: ControllerConfig) -> float:
+    """Return how long the head takes to its reference: errors are down to 5% [s]."""
+    gains = [controller.K[i] for i in robot.controlled if i < 3 and controller.K[i] > 0.0]
+    return 3.0 / min(gains) if gains else 0.0
+
+
+def settled_from_s(duration_s: float) -> float:
+    """Return from when on errors are judged in a trial of this length [s]."""
+    return 2.0 / 3.0 * duration_s
+
+
 def run_trial(trial: Trial) -> Outcome:
-    """Run one trial; the same trial has the same outcome on the same machine."""
-    robot = trial.candidate.robot(trial.template)
-    plant = KinematicPlant(robot)
-    state = plant.reset(robot.start_joint_angles_rad)
-    controller = ScpController(robot, trial.controller)
-    trajectory = trial.trajectory.make()
-    K = np.array(trial.controller.K[3:6])
-    settled = 2.0 / 3.0 * trial.duration_s
-    first_rotation = np.zeros(3)
-    position, rotation = [], []
-    singularity = peak = 0.0
-    d_min, fell_at = math.inf, None
-    steps = at_range_end = 0
-    for sample in lockstep(plant, state, controller, trajectory.sample, trial.duration_s, trial.dt):
-        result, t = sample.result, sample.t
-        steps += 1
-        if t == 0.0:
-            first_rotation = result.error[3:]
-        at_range_end += bool(result.range_limited)
-        base = planar_base(structure(robot), sample.state.phi[robot.head_links :])
-        singularity = max(singularity, singular_shape(base).nearness)
-        d_min = min(d_min, sample.state.d_min)
-        if t >= min(RUN_IN_S, settled):
-            peak = max(peak, float(np.abs(result.u_unlimited).max()))
-        if t >= settled:
-            position.append(float(result.error[:3] @ result.error[:3]))
-            beyond = result.error[3:] - first_rotation * np.exp(-K * t)
-            rotation.append(float(beyond @ beyond))
-        if sample.state.fallen:
-            fell_at = t
-            break
-    return Outcome(
-        candidate=trial.candidate,
-        trajectory=trial.trajectory.name,
-        fell_at_s=fell_at,
-        position_error_rms_m=_rms(position),
-        rotation_error_rms_rad=_rms(rotation),
-        worst_singularity=singularity,
-        min_d_min_m=d_min,
-        peak_speed_rad_s=peak,
-        range_steps=at_range_end / steps,
-    )
+    """Run one trial; the same trial has the same outcome on the same machine.
+
+    What fails in it, such as a sub-task of somebody else's, is in the outcome.
+    """
+    seen = _Seen(trial)
+    try:
+        seen.run()
+    # Singular matrices of numpy are none of this package's errors.
+    except (SnakeError, ArithmeticError, np.linalg.LinAlgError) as error:
+        seen.failed = f"after {seen.t:.2f} s: {' '.join(str(error).split())}"
+    return seen.outcome()
+
+
+class _Seen:
+    """What a trial has shown so far."""
+
+    def __init__(self, trial: Trial) -> None:
+        self._trial = trial
+        self.failed: str | None = None
+        self.t = 0.0
+        self._position: list[float] = []
+        self._rotation: list[float] = []
+        self._singularity = self._peak = 0.0
+        self._d_min = math.inf
+        self._fell_at: float | None = None
+        self._steps = self._at_range_end = 0
+
+    def run(self) -> None:
+        trial = self._trial
+        robot = trial.candidate.robot(trial.template)
+        plant = KinematicPlant(robot)
+        state = plant.reset(robot.start_joint_angles_rad)
+        self._d_min = state.d_min
+        controller = ScpController(robot, trial.controller)
+        reference = trial.trajectory.make().sample
+        K = np.array(trial.controller.K[3:6])
+        settled = settled_from_s(trial.duration_s)
+        first_rotation = np.zeros(3)
+        for sample in lockstep(plant, state, controller, reference, trial.duration_s, trial.dt):
+            result, self.t = sample.result, sample.t
+            self._steps += 1
+            if self.t == 0.0:
+                first_rotation = result.error[3:]
+            self._at_range_end += bool(result.range_limited)
+            base = planar_base(structure(robot), sample.state.phi[robot.head_links :])
+            self._singularity = max(self._singularity, singular_shape(base).nearness)
+            self._d_min = min(self._d_min, sample.state.d_min)
+            if self.t >= min(RUN_IN_S, settled):
+                self._peak = max(self._peak, float(np.abs(result.u_unlimited).max()))
+            if self.t >= settled:
+                self._position.append(float(result.error[:3] @ result.error[:3]))
+                beyond = result.error[3:] - first_rotation * np.exp(-K * self.t)
+                self._rotation.append(float(beyond @ beyond))
+            if sample.state.fallen:
+                self._fell_at = self.t
+                return
+
+    def outcome(self) -> Outcome:
+        whole = self.failed is None
+        return Outcome(
+            candidate=self._trial.candidate,
+            trajectory=self._trial.trajectory.name,
+            fell_at_s=self._fell_at,
+            position_error_rms_m=_rms(self._position) if whole else math.inf,
+            rotation_error_rms_rad=_rms(self._rotation) if whole else math.inf,
+            worst_singularity=self._singularity,
+            min_d_min_m=self._d_min,
+            peak_speed_rad_s=self._peak,
+            range_steps=self._at_range_end / max(self._steps, 1),
+            failed=self.failed,
+        )
 
 
 def _rms(squares: list[float]) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import concurrent.futures
 import importlib
 import multiprocessing
@@ -14,6 +15,7 @@ from typing import Any
 from snake_control.errors import StudyError
 from snake_control.experiment.study.trial import Outcome, Trial, run_trial
 
+_ANSWER_S = 5.0
 _THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 
 
@@ -79,7 +81,9 @@ def run_on_dask(trials: Sequence[Trial], scheduler: str) -> Iterator[tuple[Trial
             "a scheduler was given, but Dask is not installed: pip install dask distributed"
         ) from error
     try:
-        client = distributed.Client(scheduler, timeout="10s", set_as_default=False)
+        # A client that does not reach its scheduler keeps trying when it is closed.
+        asyncio.run(_reach(distributed, scheduler))
+        client = distributed.Client(scheduler, timeout=_ANSWER_S, set_as_default=False)
     except (OSError, ValueError) as error:
         raise StudyError(f"no Dask scheduler answers at {scheduler}: {error}") from error
     with client:
@@ -92,3 +96,14 @@ def run_on_dask(trials: Sequence[Trial], scheduler: str) -> Iterator[tuple[Trial
                 yield futures[future], future.result()
         finally:
             client.cancel([future for future in futures if not future.done()])
+
+
+async def _reach(distributed: Any, scheduler: str) -> None:
+    """Connect once as a client would.
+
+    Raises:
+        OSError, ValueError: nobody who speaks Dask's protocol is there.
+    """
+    arguments = distributed.Security().get_connection_args("client")
+    connection = await distributed.comm.connect(scheduler, timeout=_ANSWER_S, **arguments)
+    await connection.close()

@@ -47,6 +47,8 @@ def test_too_many_are_refused_and_few_enough_are_not():
     with pytest.raises(StudyError, match="wheelless links to look at"):
         admissible(long)
     assert {len(c.wheelless_links) for c in admissible(long, [1, 2])} == {1, 2}
+    with pytest.raises(StudyError, match="no choice with 99 of the links 6 to 11 wheelless"):
+        admissible(PAPER, [99])
 
 
 def test_a_sample_is_drawn_without_repetition_and_repeats_itself():

@@ -96,3 +96,40 @@ def test_csv_holds_every_row(tmp_path):
     assert [int(row["falls"]) for row in read] == [0, 1]
     draw(rows, A, tmp_path / "r.png")
     assert (tmp_path / "r.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_runs_that_failed_are_counted_and_named():
+    outcomes = [
+        outcome(A, failed="after 0.10 s: sub-task m:T fails", position_error_rms_m=math.inf),
+        outcome(A, "arc"),
+        outcome(B, fell_at_s=3.0),
+        outcome(B, "arc"),
+    ]
+    rows = ranking(outcomes)
+    assert [(row.candidate, row.failed, row.falls, row.lost) for row in rows] == [
+        (B, 0, 1, 0),
+        (A, 1, 0, 0),
+    ]
+    assert "0 of 2 choices neither fell" in verdict(rows, A)
+    assert f"({A}) could not be run to the end on 1 of the trajectories" in verdict(rows, A)
+    for chosen in (A, B, C):
+        assert verdict(rows, chosen).endswith(
+            f"Failed runs: 1, such as {A}: line, after 0.10 s: sub-task m:T fails"
+        )
+    table = format_ranking(rows, A).splitlines()
+    assert [line.split()[-1] for line in table if line != table[1]] == ["failed", "0", "1"]
+    assert "failed" not in format_ranking(ranking(outcomes[2:]), B)
+
+
+def test_tracking_that_has_not_settled_is_not_judged(tmp_path):
+    outcomes = [
+        outcome(A, position_error_rms_m=0.05),
+        outcome(B, peak_speed_rad_s=2.0),
+    ]
+    rows = ranking(outcomes, judge_tracking=False)
+    assert [(row.candidate, row.lost) for row in rows] == [(A, None), (B, None)]
+    assert "2 of 2 choices neither fell, nor came near a singular shape" in verdict(rows, A)
+    assert "tracking is not judged" in verdict(rows, A)
+    cells = format_ranking(rows, A).splitlines()[2].split()
+    assert (cells[4], cells[6]) == ("-", "-")
+    draw(rows, A, tmp_path / "r.png")

@@ -10,10 +10,12 @@ from snake_control.errors import StudyError
 from snake_control.experiment.study.candidates import Candidate
 from snake_control.experiment.study.store import OutcomeStore
 from snake_control.experiment.study.trajectories import built_in
-from snake_control.experiment.study.trial import Outcome, Trial, run_trial
-from support.robots import PAPER
+from snake_control.experiment.study.trial import Outcome, Trial, run_trial, transient_s
+from support.own_sub_tasks import LATE
+from support.robots import PAPER, ROBOTS
 
 OUTCOME = Outcome(Candidate((7, 9), (3,)), "line", None, 0.1 + 0.2, math.inf, 0.5, -1e-3, 2.0, 0.25)
+FAILED = dataclasses.replace(OUTCOME, failed="after 0.10 s: sub-task m:T fails: KeyError: 'x'")
 FALLEN = dataclasses.replace(OUTCOME, fell_at_s=12.3)
 
 
@@ -21,8 +23,11 @@ def test_outcomes_come_back_exactly(tmp_path):
     path = tmp_path / "outcomes.jsonl"
     store = OutcomeStore(path)
     store.add("a", OUTCOME)
+    store.add("b", FAILED)
     store.add("b", FALLEN)
+    store.add("d", FAILED)
     again = OutcomeStore(path)
+    assert again["d"] == FAILED
     assert again["a"] == OUTCOME
     assert again["b"] == FALLEN
     assert "c" not in again
@@ -86,3 +91,26 @@ def test_a_trial_repeats_itself_and_ends_with_a_fall():
     fallen = run_trial(trial(template=heavy))
     assert fallen.fell_at_s == 0.0
     assert math.isinf(fallen.position_error_rms_m)
+
+
+def test_a_trial_whose_sub_task_fails_says_so(own_package):
+    own_package(LATE)
+    gains = ControllerConfig(base_sub_tasks=("my_package.my_module:Late",))
+    found = run_trial(trial(controller=gains))
+    assert found.failed is not None
+    assert found.failed.startswith("after 0.")
+    assert "sub-task my_package.my_module:Late, gradient fails: KeyError: 'gone'" in found.failed
+    assert math.isinf(found.position_error_rms_m)
+    assert 0.0 < found.worst_singularity < 1.0
+    assert 0.0 < found.min_d_min_m < 1.0
+    nowhere = ControllerConfig(base_sub_tasks=("my_package.nowhere:Late",))
+    assert "my_package.nowhere" in str(run_trial(trial(controller=nowhere)).failed)
+
+
+def test_a_head_needs_three_time_constants_of_its_slowest_gain():
+    assert transient_s(PAPER, ControllerConfig()) == pytest.approx(3.0 / 0.25)
+    gains = ControllerConfig(K=(0.5, 0.0, 0.1, 0.01, 0.01, 0.01))
+    assert transient_s(PAPER, gains) == pytest.approx(30.0)
+    # z is nothing that a planar snake moves.
+    assert transient_s(ROBOTS["planar"], gains) == pytest.approx(6.0)
+    assert transient_s(PAPER, ControllerConfig(K=(0.0,) * 6)) == 0.0

@@ -43,6 +43,8 @@ def test_a_file(tmp_path):
         ("a: {kind: arc, start_pose: [0, 0, 0, 0, 0, 0], speed_m_s: 1, radius_m: 0}", "radius_m"),
         ("a: {kind: arc, start_pose: [0, 0, 0, 0, 0, 0], velocity: 1}", "a.velocity = 1: allowed"),
         ("a: 3", "a = 3"),
+        ("a: {kind: [line]}", r"a.kind = \['line'\]: allowed: line, arc"),
+        ("a: {kind: line, start_pose: [0, 0, 0, 0, 0, 1" + 400 * "0" + "]}", "a.start_pose"),
     ],
 )
 def test_a_mistake_is_named(tmp_path, text, words):
@@ -52,10 +54,10 @@ def test_a_mistake_is_named(tmp_path, text, words):
         read_trajectories(path)
 
 
-@pytest.mark.parametrize("text", ["[]", "", "a: [", None])
+@pytest.mark.parametrize("text", ["[]", "", "a: [", "a: 2001-13-01", b"\xff\xfe", None])
 def test_a_file_that_is_no_map(tmp_path, text):
     path = tmp_path / "t.yaml"
     if text is not None:
-        path.write_text(text)
+        path.write_bytes(text if isinstance(text, bytes) else text.encode())
     with pytest.raises(ConfigFileError, match=r"t\.yaml"):
         read_trajectories(path)
