@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from snake_interfaces.msg import ControllerState, JointVelocityCommand
 
-from snake_control.config import RobotConfig
+from snake_control.config import ControllerConfig, RobotConfig
 from snake_control.control.scp_controller import ControlResult
 from snake_control.model.rotation import wrap
 
@@ -131,19 +131,20 @@ class ControllerMessages:
         message.velocity = self._at_rest if step.result is None else _array(step.result.u)
         return message
 
-    def state(self, step: Step, case: int, step_time: float) -> ControllerState:
+    def state(self, step: Step, gains: ControllerConfig, step_time: float) -> ControllerState:
         """Return everything a step decided; NaN where it decided nothing.
 
         Args:
             step: the step.
-            case: preset of sub-tasks in force.
+            gains: what is in force.
             step_time: how long it took to compute [s].
         """
         message = self._state
         _stamp(message, step.stamp_ns)
         message.status = step.status
         message.text = step.text
-        message.experiment_case = case
+        message.experiment_case = gains.case
+        message.preset = gains.preset
         message.w = step.w
         message.w_d = step.w_d
         message.w_d_dot = step.w_d_dot

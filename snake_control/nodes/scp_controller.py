@@ -59,7 +59,7 @@ class ScpControllerNode(Node):
         config = self._configured.config
         self._robot = config.robot
         self._own = own = config.scp_controller
-        self._case = config.controller.case
+        self._gains = config.controller
         self._controller: ScpController = self._configured.prepared
         self._enabled = own.enabled
         self._status: int | None = None
@@ -103,7 +103,7 @@ class ScpControllerNode(Node):
         self.create_timer(_MARKERS_PERIOD_S, self._publish_markers, clock=self._steady)
 
     def _on_parameters(self, config: Config) -> None:
-        self._case = config.controller.case
+        self._gains = config.controller
         self._controller = self._configured.prepared
         self.get_logger().info(f"gains changed: {config.controller}")
 
@@ -120,12 +120,12 @@ class ScpControllerNode(Node):
         self._command.publish(self._messages.command(step))
         elapsed = time.perf_counter() - started
         try:
-            state = self._messages.state(step, self._case, elapsed)
+            state = self._messages.state(step, self._gains, elapsed)
         except _NO_ANSWER as error:
             # The state asks more of the posture than the command, which has gone: take it back.
             _give_up(step, error)
             self._command.publish(self._messages.command(step))
-            state = self._messages.state(step, self._case, elapsed)
+            state = self._messages.state(step, self._gains, elapsed)
         self._state.publish(state)
         if step.status != self._status:
             self._status = step.status

@@ -62,7 +62,7 @@ def test_commands_what_the_control_law_says(rig):
     np.testing.assert_allclose(state.phi, rig.phi, atol=1e-15)
     np.testing.assert_allclose(state.phi_tilde_dot_d, expected.phi_tilde_dot_d, rtol=1e-6)
     assert list(state.scp_name) == ["joint_3", "joint_6", "joint_8", "joint_10"]
-    assert state.experiment_case == 3
+    assert (state.experiment_case, state.preset) == (3, "paper")
     assert state.v_h == pytest.approx(5.8775e-7, rel=1e-4)
     assert state.v_b1 == pytest.approx(2.4757e8, rel=1e-4)
     assert state.d_min == pytest.approx(0.034238, abs=1e-6)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import concurrent.futures
 import importlib
+import itertools
 import multiprocessing
 import os
 import signal
@@ -37,9 +38,20 @@ def run_in_processes(trials: Sequence[Trial], workers: int) -> Iterator[tuple[Tr
             initializer=_prepare_worker,
         )
         try:
-            futures = {pool.submit(run_trial, trial): trial for trial in trials}
-            for future in concurrent.futures.as_completed(futures):
-                yield futures[future], future.result()
+            # No more than the workers can take: what waits inside the pool cannot be called off.
+            waiting = iter(trials)
+            running = {
+                pool.submit(run_trial, trial): trial for trial in itertools.islice(waiting, workers)
+            }
+            while running:
+                done, _ = concurrent.futures.wait(
+                    running, return_when=concurrent.futures.FIRST_COMPLETED
+                )
+                for future in done:
+                    trial = running.pop(future)
+                    for following in itertools.islice(waiting, 1):
+                        running[pool.submit(run_trial, following)] = following
+                    yield trial, future.result()
         finally:
             pool.shutdown(cancel_futures=True)
     finally:
