@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import dataclasses
 import enum
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
+from snake_control.config import RobotConfig
+from snake_control.experiment.cases import CASES
 from snake_control.experiment.facts import END_S, RUN_IN_S, SINGULAR_SHARE, WINDOW_S, Facts
 from snake_control.experiment.summary import finite
 
@@ -57,10 +59,30 @@ class Finding:
 def findings(runs: Mapping[int, Facts]) -> list[Finding]:
     """Judge every statement by the runs there are.
 
+    What the paper states about its own robot (when it fell, how its joints swung) is one finding
+    together for another robot: none of it applies.
+
     Args:
         runs: facts of a run for each case that was run.
     """
-    return [statement(runs) for statement in _STATEMENTS]
+    robots = [facts.run.config.robot for facts in runs.values()]
+    if all(map(is_papers_robot, robots)):
+        return [statement.judge(runs) for statement in _STATEMENTS]
+    planar = any(robot.planar for robot in robots)
+    left = [s for s in _STATEMENTS if not (s.of_its_robot or (planar and s.needs_head))]
+    found = (
+        f"Not this robot: {len(_STATEMENTS) - len(left)} of {len(_STATEMENTS)} statements, about "
+        "when the paper's robot fell and how its joints and its head moved, do not apply."
+    )
+    apart = Finding(CASES, "What the paper saw on its own robot.", found, Verdict.NOT_SHOWN, {})
+    return [*(statement.judge(runs) for statement in left), apart]
+
+
+def is_papers_robot(robot: RobotConfig) -> bool:
+    """Whether a robot has the paper's links, axes and SCPs."""
+    paper = RobotConfig()
+    names = ("links", "head_links", "wheelless_links", "head_scp_joints", "joint_axes")
+    return all(getattr(robot, name) == getattr(paper, name) for name in names)
 
 
 def as_json(found: Iterable[Finding]) -> list[dict[str, Any]]:
@@ -81,14 +103,24 @@ def as_json(found: Iterable[Finding]) -> list[dict[str, Any]]:
 # Whether the statement holds, what came out, its numbers, and why if it does not; or only why this
 # robot cannot show it.
 _Judged = tuple[bool, str, dict[str, Any], str] | str
-_NO_HEAD = "This robot has no raised head part."
-_STATEMENTS: list[Callable[[Mapping[int, Facts]], Finding]] = []
+
+
+@dataclasses.dataclass(frozen=True)
+class _Statement:
+    judge: Callable[[Mapping[int, Facts]], Finding]
+    of_its_robot: bool
+    needs_head: bool
+
+
+_STATEMENTS: list[_Statement] = []
 
 
 def _statement(
     cases: tuple[int, ...],
     paper: str,
     window: bool = False,
+    of_its_robot: bool = False,
+    needs_head: bool = False,
     refuted_after_s: float = 0.0,
     shown_after_s: float = 0.0,
 ) -> Callable[[Callable[..., _Judged]], Callable[..., _Judged]]:
@@ -98,6 +130,8 @@ def _statement(
         cases: whose facts the judge gets, in this order.
         paper: the statement.
         window: whether it needs enough of ``WINDOW_S``.
+        of_its_robot: whether it is about the paper's robot alone.
+        needs_head: whether it is about the raised head part.
         refuted_after_s: a run that ends before this time cannot refute it [s].
         shown_after_s: a run that ends before this time cannot confirm it [s].
     """
@@ -118,7 +152,7 @@ def _statement(
             verdict = Verdict.AS_IN_PAPER if holds else Verdict.DIFFERS
             return Finding(cases, paper, found, verdict, numbers, "" if holds else why)
 
-        _STATEMENTS.append(statement)
+        _STATEMENTS.append(_Statement(statement, of_its_robot, needs_head))
         return judge
 
     return register
@@ -127,21 +161,28 @@ def _statement(
 def _lacking(runs: Mapping[int, Facts], cases: tuple[int, ...], window: bool) -> str:
     missing = [case for case in cases if case not in runs]
     if missing:
-        return f"Case {' and '.join(map(str, missing))} was not run."
+        return f"{_cases(missing)} {'was' if len(missing) == 1 else 'were'} not run."
     if window:
         short = [case for case in cases if not runs[case].has_window]
         if short:
             return (
-                f"Case {' and '.join(map(str, short))} ended too soon: this is judged over "
+                f"{_cases(short)} ended too soon: this is judged over "
                 f"{WINDOW_S[0]:.0f} to {WINDOW_S[1]:.0f} s."
             )
     return ""
+
+
+def _cases(numbers: Sequence[int]) -> str:
+    """Return "Case 1", "Cases 1 and 2", "Cases 1, 2 and 3"."""
+    *first, last = map(str, numbers)
+    return f"Cases {', '.join(first)} and {last}" if first else f"Case {last}"
 
 
 @_statement(
     (1,),
     "V_b1 became zero: the robot turned singular before it fell at 24.8 s (Fig. 14).",
     refuted_after_s=31.0,
+    of_its_robot=True,
 )
 def _turns_singular(facts: Facts) -> _Judged:
     at = facts.singular_at_s
@@ -162,7 +203,9 @@ def _turns_singular(facts: Facts) -> _Judged:
     return at is not None, found, numbers, "The run ended before, or the SCPs were not still."
 
 
-@_statement((1,), "x_h therefore left its target (Fig. 8).", refuted_after_s=31.0)
+@_statement(
+    (1,), "x_h therefore left its target (Fig. 8).", refuted_after_s=31.0, of_its_robot=True
+)
 def _left_behind(facts: Facts) -> _Judged:
     error = float(facts.off_law[0])
     found = (
@@ -192,7 +235,7 @@ def _fall(facts: Facts, case: int) -> tuple[bool, str, dict[str, Any], str]:
     return at is not None, found, numbers, why
 
 
-@_statement((1,), "The robot fell at 24.8 s (Fig. 14).", refuted_after_s=24.8)
+@_statement((1,), "The robot fell at 24.8 s (Fig. 14).", refuted_after_s=24.8, of_its_robot=True)
 def _case_1_falls(facts: Facts) -> _Judged:
     return _fall(facts, 1)
 
@@ -242,7 +285,9 @@ def _scps_oscillate(still: Facts, facts: Facts) -> _Judged:
     )
 
 
-@_statement((2,), "The wave grows towards the tail: phi_7 < phi_9 < phi_11.", window=True)
+@_statement(
+    (2,), "The wave grows towards the tail: phi_7 < phi_9 < phi_11.", window=True, of_its_robot=True
+)
 def _grows_towards_tail(facts: Facts) -> _Judged:
     sizes = _base_sizes(facts)
     found = " < ".join(f"{size:.2f}" for size in sizes.values())
@@ -276,10 +321,10 @@ def _case_2_tracks(facts: Facts) -> _Judged:
     return _tracking(facts)
 
 
-@_statement((2,), "V_h increased, the sub-task of the H-SCP (Fig. 13).", window=True)
+@_statement(
+    (2,), "V_h increased, the sub-task of the H-SCP (Fig. 13).", window=True, needs_head=True
+)
 def _case_2_V_h(facts: Facts) -> _Judged:
-    if facts.run.config.robot.planar:
-        return _NO_HEAD
     growth = facts.V_h_growth
     found = (
         f"From {facts.V_h[0]:.2e} to {growth:.2f} times that (median; largest "
@@ -292,6 +337,7 @@ def _case_2_V_h(facts: Facts) -> _Judged:
     (2,),
     "V_b2 = d_min went down to almost zero and the robot fell at 45.7 s (Fig. 14).",
     refuted_after_s=45.7,
+    of_its_robot=True,
 )
 def _case_2_falls(facts: Facts) -> _Judged:
     return _fall(facts, 2)
@@ -320,10 +366,8 @@ def _case_3_margin(two: Facts, three: Facts) -> _Judged:
     return median[1] > median[0] and tenth[1] > tenth[0], found, numbers, ""
 
 
-@_statement((3,), "V_h and V_b1 increased (Figs. 13, 14).", window=True)
+@_statement((3,), "V_h and V_b1 increased (Figs. 13, 14).", window=True, needs_head=True)
 def _case_3_costs(facts: Facts) -> _Judged:
-    if facts.run.config.robot.planar:
-        return _NO_HEAD
     V_b1 = facts.V_b1_median / float(facts.V_b1[0])
     found = f"V_h to {facts.V_h_growth:.2f} and V_b1 to {V_b1:.2f} times its start (medians)."
     numbers = {"V_h_over_start": facts.V_h_growth, "V_b1_over_start": V_b1}
@@ -335,7 +379,7 @@ def _case_3_tracks(facts: Facts) -> _Judged:
     return _tracking(facts)
 
 
-@_statement((3,), "A small steady error in y_h remained (Fig. 10).", window=True)
+@_statement((3,), "A small steady error in y_h remained (Fig. 10).", window=True, of_its_robot=True)
 def _steady_y_error(facts: Facts) -> _Judged:
     mean = float(facts.mean_error_at_end[1])
     found = (
@@ -376,11 +420,13 @@ def _other_motion(two: Facts, three: Facts) -> _Judged:
     return change > _OTHER_SHAPE, found, numbers, ""
 
 
-@_statement((2, 3), "The motion of the B-SCPs does not affect the head part (Sections 2, 6).")
+@_statement(
+    (2, 3),
+    "The motion of the B-SCPs does not affect the head part (Sections 2, 6).",
+    needs_head=True,
+)
 def _head_unaffected(two: Facts, three: Facts) -> _Judged:
     n_h = two.run.config.robot.head_links
-    if n_h == 0:
-        return _NO_HEAD
     steps = min(len(two.t), len(three.t))
     heads = two.phi[:steps, :n_h], three.phi[:steps, :n_h]
     most = float(np.abs(heads[0] - heads[1]).max(initial=0.0))

@@ -20,7 +20,7 @@ from snake_control.config import RobotConfig
 from snake_control.experiment import comparison, style
 from snake_control.experiment.facts import END_S, RUN_IN_S, SINGULAR_SHARE, WINDOW_S, Facts
 from snake_control.experiment.figures import CASE_NAMES
-from snake_control.experiment.findings import Finding, Verdict
+from snake_control.experiment.findings import Finding, Verdict, is_papers_robot
 from snake_control.experiment.internal_motion import InternalMotion, describe
 from snake_control.experiment.internal_motion import draw as draw_internal_motion
 from snake_control.experiment.motion import motion
@@ -77,7 +77,7 @@ def write_report(
     template = importlib.resources.files(__package__).joinpath(_TEMPLATE).read_text("utf-8")
     text = environment.from_string(template).render(
         robot=_robot_words(any_run.config.robot),
-        is_papers_robot=_is_papers(any_run.config.robot),
+        is_papers_robot=is_papers_robot(any_run.config.robot),
         how=_how(any_run.settings.parameters),
         runs=[
             (CASE_NAMES[case], facts.run.summary["ended"]) for case, facts in sorted(runs.items())
@@ -225,14 +225,6 @@ def data_uri(figure: Figure) -> str:
     # Without the version of matplotlib, so that the same run gives the same bytes.
     figure.savefig(buffer, format="png", dpi=_DPI, metadata={"Software": None})
     return "data:image/png;base64," + base64.b64encode(buffer.getvalue()).decode("ascii")
-
-
-def _is_papers(robot: RobotConfig) -> bool:
-    paper = RobotConfig()
-    return all(
-        getattr(robot, name) == getattr(paper, name)
-        for name in ("links", "head_links", "wheelless_links", "head_scp_joints", "joint_axes")
-    )
 
 
 def _robot_words(robot: RobotConfig) -> str:

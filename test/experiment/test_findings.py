@@ -11,11 +11,11 @@ import pytest
 from snake_control.experiment.cases import load_case
 from snake_control.experiment.facts import Facts
 from snake_control.experiment.findings import Finding, Verdict, as_json, findings
-from snake_control.experiment.run import CaseRun, Settings
+from snake_control.experiment.run import CaseRun, Settings, run_case
 from snake_control.experiment.series import Series
 from snake_control.experiment.summary import Run, summarise
 from support.experiments import step
-from support.robots import PAPER
+from support.robots import CONFIG, PAPER
 from support.runs import paper_facts
 
 CASES = (1, 2, 3)
@@ -99,6 +99,7 @@ def test_what_was_not_run_is_not_shown():
     assert of(found, "V_b1 became zero").verdict is Verdict.NOT_SHOWN
     assert "Case 1 was not run" in of(found, "vibrated periodically").found
     assert of(found, "grows towards the tail").verdict is Verdict.AS_IN_PAPER
+    assert of(found, "joint velocities of Case 3").found == "Cases 1 and 3 were not run."
 
 
 def made_up(case: int, change, until_s: float = 60.0, **settings) -> Facts:
@@ -185,3 +186,19 @@ def test_window_ends_at_a_fall():
     assert facts.t[facts.window].max() == pytest.approx(50.0)
     assert facts.has_window
     assert dataclasses.replace(facts.run, interrupted=True).interrupted
+
+
+def test_what_is_about_the_papers_robot_is_one_line_for_another():
+    config = load_case([CONFIG / "planar_snake.yaml"], 2)
+    facts = Facts(run_case(config, Settings(duration_s=0.2)))
+    found = findings({2: facts})
+    apart = of(found, "own robot")
+    assert apart.verdict is Verdict.NOT_SHOWN
+    assert apart.found.startswith("Not this robot: 9 of 17 statements")
+    assert len(found) == 17 - 9 + 1
+    texts = " ".join(finding.paper for finding in found)
+    for words in ("24.8 s", "45.7 s", "phi_7", "V_h", "head part"):
+        assert words not in texts
+    fig_2 = dataclasses.replace(PAPER, wheelless_links=(7, 9, 10))
+    other = run_case(dataclasses.replace(load_case((), 2), robot=fig_2), Settings(duration_s=0.2))
+    assert of(findings({2: Facts(other)}), "own robot").found.startswith("Not this robot: 6 of 17")
