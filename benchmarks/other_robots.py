@@ -23,7 +23,7 @@ from tqdm import tqdm
 from snake_control.config import ControllerConfig, RobotConfig
 from snake_control.control.reference import Reference
 from snake_control.control.scp_controller import ScpController
-from snake_control.errors import SingularError
+from snake_control.errors import ModelError
 from snake_control.experiment import style
 from snake_control.experiment.lockstep import LockstepSample, lockstep
 from snake_control.model.singular_shape import SINGULAR_ABOVE
@@ -133,7 +133,7 @@ def follow(robot: RobotConfig, controller: ControllerConfig, duration_s: float) 
             samples.append(sample)
             if sample.state.fallen:
                 break
-    except SingularError as error:
+    except ModelError as error:
         ended = str(error)
     half = robot.half_length_m
     t = np.array([s.t for s in samples])

@@ -54,20 +54,6 @@ class ModelError(SnakeError, ValueError):
     """A model quantity was asked for with an argument of wrong shape or without a finite value."""
 
 
-class SingularError(SnakeError, ArithmeticError):
-    """The posture is singular: a matrix that the control law inverts has no inverse.
-
-    Attributes:
-        matrix: name of the matrix in the paper (``B_tilde``).
-        sigma_min: its smallest singular value.
-    """
-
-    def __init__(self, matrix: str, sigma_min: float) -> None:
-        self.matrix = matrix
-        self.sigma_min = sigma_min
-        super().__init__(f"{matrix} is singular: smallest singular value {sigma_min:.3g}")
-
-
 class SubTaskError(SnakeError, RuntimeError):
     """A sub-task of somebody else's raised an error or gave an answer of the wrong form.
 

@@ -13,7 +13,7 @@ import numpy as np
 from snake_control.config import Config
 from snake_control.control.scp_controller import ControlResult, ScpController
 from snake_control.control.torque_controller import TorqueController, TorqueResult
-from snake_control.errors import ModelError, SingularError, SubTaskError
+from snake_control.errors import ModelError, SubTaskError
 from snake_control.experiment.lockstep import Controller, LockstepSample, Unlimited, lockstep
 from snake_control.experiment.parameters import configuration_parameters
 from snake_control.experiment.series import Series, Step
@@ -127,7 +127,7 @@ def run_case(
             if fell_at_s is not None and step.t_s >= fell_at_s + AFTER_FALL_S:
                 ended = f"the robot fell at {fell_at_s:.1f} s"
                 break
-    except (SingularError, ModelError, SubTaskError) as error:
+    except (ModelError, SubTaskError) as error:
         ended = f"no answer after {len(series) / settings.rate_hz:.2f} s: {error}"
     finally:
         series.close()

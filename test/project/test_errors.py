@@ -4,7 +4,7 @@ import pickle
 
 import pytest
 
-from snake_control.errors import ConfigError, ServoError, SingularError, SnakeError
+from snake_control.errors import ConfigError, NotReadyError, ServoError, SnakeError
 
 
 @pytest.mark.parametrize(
@@ -12,7 +12,7 @@ from snake_control.errors import ConfigError, ServoError, SingularError, SnakeEr
     [
         SnakeError("plain"),
         ConfigError("robot.links", 3, "allowed: 6 to 200"),
-        SingularError("B_tilde", 1e-12),
+        NotReadyError("the next step", 2.0, "nothing came"),
         ServoError(["servo 3 is missing", "servo 4 is hot"]),
     ],
     ids=lambda error: type(error).__name__,
