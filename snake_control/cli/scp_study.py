@@ -11,11 +11,18 @@ import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from types import FrameType
 
 from tqdm import tqdm
 
 from snake_control.cli.checked import counting, natural, network_address, positive
-from snake_control.cli.common import EXIT_FAILED, EXIT_OK, EXIT_USAGE, add_params_file
+from snake_control.cli.common import (
+    EXIT_FAILED,
+    EXIT_OK,
+    EXIT_USAGE,
+    add_params_file,
+    ending_signals,
+)
 from snake_control.config import Config, load
 from snake_control.control.scp_controller import ScpController
 from snake_control.errors import SnakeError
@@ -39,8 +46,6 @@ from snake_control.experiment.study.trajectories import (
 from snake_control.experiment.study.trial import Outcome, Trial, settled_from_s, transient_s
 from snake_control.experiment.study.workers import run_in_processes, run_on_dask
 
-EXIT_INTERRUPTED = 130
-
 # Fewer steps than this show nothing of a motion.
 _LEAST_STEPS = 10
 
@@ -49,7 +54,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the study; return its exit code.
 
     0: done; 1: some run failed (the others are ranked), or the cluster did; 2: bad arguments or
-    configuration; 130: Ctrl-C (what was done is kept, and the next call goes on from there).
+    configuration; 130, 143: SIGINT, SIGTERM (what was done is kept, and the next call goes on from
+    there).
     """
     given = _parsed(argv)
     try:
@@ -67,11 +73,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     print(f"gains: {gains_text(config.controller)}")
     settled = _says_settled(config, given.duration)
     try:
-        _run(trials, store, given)
+        # Also where whoever started this process has it ignore Ctrl-C, as shells do in scripts.
+        with ending_signals(_stop):
+            _run(trials, store, given)
         code = EXIT_OK
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as stop:
         print("\nstopped; the same command goes on from here", file=sys.stderr)
-        code = EXIT_INTERRUPTED
+        code = 128 + int(stop.args[0])
     except (SnakeError, OSError) as error:
         print(f"scp_study: {error}", file=sys.stderr)
         return EXIT_FAILED
@@ -81,6 +89,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     if code == EXIT_OK and any(outcome.failed for outcome in outcomes):
         code = EXIT_FAILED
     return code
+
+
+def _stop(number: int, _frame: FrameType | None) -> None:
+    raise KeyboardInterrupt(number)
 
 
 def _config(given: argparse.Namespace) -> Config:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 import signal
 import subprocess
 import sys
@@ -70,20 +71,28 @@ def test_killed_half_way_it_goes_on(tmp_path):
     assert len({line[:40] for line in store.read_text().splitlines()}) == some()
 
 
-def test_ctrl_c_keeps_what_was_done(tmp_path):
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_signal_keeps_what_was_done(tmp_path, number, code):
+    # Started as a script's background job, which has SIGINT ignored.
+    words = shlex.join(command(tmp_path, "--duration", "20", "--workers", "1"))
     process = Process(
         "scp_study",
-        command(tmp_path, "--duration", "60", "--workers", "1"),
+        ["bash", "-c", f"trap '' INT; exec {words}"],
         log=tmp_path / "log.txt",
         cwd=ROOT,
         environment=os.environ,
     )
     store = tmp_path / "outcomes.jsonl"
-    wait_for(
-        lambda: (store.exists() and store.read_text()) or not process.running, 60.0, "an outcome"
-    )
-    os.kill(process.pid, signal.SIGINT)
-    assert process.wait(60.0) == 130, process.report()
+    try:
+        wait_for(
+            lambda: (store.exists() and store.read_text()) or not process.running,
+            60.0,
+            "an outcome",
+        )
+        os.kill(process.pid, number)
+        assert process.wait(60.0) == code, process.report()
+    finally:
+        process.kill()
     assert "goes on from here" in process.output()
     assert "Traceback" not in process.output()
 
