@@ -62,7 +62,7 @@ def simulate(run: Run, duration_s: float) -> list[tuple[float, TorquePlantState,
     """Return time, plant state and what the controller decided, every 10 ms."""
     robot = RobotConfig()
     controller = TorqueController(robot, ControllerConfig(case=run.case))
-    plant = TorquePlant(robot, 5e-3 if run.hold_s == 0 else 1e-3)
+    plant = TorquePlant(robot)
     state = plant.reset(robot.start_joint_angles_rad)
     goal: Callable[[float], Reference] = LINE.sample
     if run.approach_s:
