@@ -28,6 +28,7 @@ from std_srvs.srv import SetBool, Trigger
 from snake_control.cli.common import EXIT_FAILED, EXIT_OK, EXIT_USAGE, ending_signals
 from snake_control.cli.demo_arguments import DemoArguments, parse_arguments
 from snake_control.cli.demo_outcome import Outcome, RunJudge, progress_text
+from snake_control.cli.memory import MemoryWatch
 from snake_control.cli.node_processes import NodeProcesses
 from snake_control.cli.progress import ProgressLine
 from snake_control.cli.ros_domain import own_domain
@@ -53,6 +54,8 @@ _BUS_STATES = {
     BusState.STATE_TORQUE_OFF: "torque off",
     BusState.STATE_STOPPED: "stopped by a fault",
     BusState.STATE_EMERGENCY_STOP: "emergency stop",
+    BusState.STATE_LOWERING: "lowering",
+    BusState.STATE_DRY_RUN: "dry run",
 }
 
 
@@ -98,6 +101,7 @@ class Demo:
             "OPENBLAS_NUM_THREADS": "1",
         }
         self.processes = NodeProcesses(arguments.out / "logs", environment)
+        self.memory = MemoryWatch()
         self.series = Series(config.robot, arguments.out / "series.csv")
         self.startup_s: float | None = None
         self.stop_findings: list[str] = []
@@ -206,6 +210,7 @@ class Demo:
         while True:
             self._take_all(recorder)
             now = time.monotonic()
+            self.memory.look(now, self.processes.pids())
             if recorder.controller is not seen:
                 seen, heard = recorder.controller, now
             elif now - heard > _SILENCE_TIMEOUT_S:
@@ -355,6 +360,7 @@ def _write_results(arguments: DemoArguments, config: Config, demo: Demo, outcome
     summary = summarise(demo.series, run)
     summary["exit_code"] = outcome.exit_code
     summary["startup_s"] = demo.startup_s
+    summary["memory"] = demo.memory.growth()
     summary["stop_findings"] = demo.stop_findings
     write_summary(summary, arguments.out / "summary.json")
     figures = draw_all(demo.series, run.case, arguments.out)

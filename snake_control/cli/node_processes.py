@@ -53,6 +53,10 @@ class NodeProcesses:
         process = self._running.get(kind)
         return process is not None and process.poll() is None
 
+    def pids(self) -> dict[str, int]:
+        """Return the process ids by kind of node."""
+        return {kind: process.pid for kind, process in self._running.items()}
+
     def check(self) -> None:
         """Do nothing while all nodes run.
 

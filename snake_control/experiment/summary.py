@@ -23,6 +23,8 @@ Array = NDArray[np.float64]
 SETTLED_FROM_S = 40.0
 """Errors are judged from this time on: the first seconds carry the run-in from w(0)."""
 
+_RATE_WINDOW_S = 10.0
+
 _PACKAGES = {
     "snake_control": ("snake_control", "snake-control"),
     "numpy": ("numpy",),
@@ -231,9 +233,12 @@ def _control(series: Series) -> dict[str, Any]:
     periods = np.diff(t)
     median = _percentile(periods, 50)
     jitter = np.abs(periods - (median or 0.0))
+    slowest, fastest = _rates_over_windows(t)
     return {
         "steps": len(series),
         "rate_hz": len(periods) / (t[-1] - t[0]) if len(t) > 1 and t[-1] > t[0] else None,
+        "rate_slowest_10_s_hz": slowest,
+        "rate_fastest_10_s_hz": fastest,
         "period_p50_s": median,
         "period_p99_s": _percentile(periods, 99),
         "period_max_s": float(periods.max()) if len(periods) else None,
@@ -243,6 +248,17 @@ def _control(series: Series) -> dict[str, Any]:
         "step_time_p99_s": _percentile(series.numbers("step_time_s"), 99),
         "steps_by_status": dict(Counter(series.texts("status"))),
     }
+
+
+def _rates_over_windows(t: Array) -> tuple[float | None, float | None]:
+    """Return the lowest and the highest rate over any window of 10 s; ``None`` if too short."""
+    # For each step the first one at least a window later.
+    later = np.searchsorted(t, t + _RATE_WINDOW_S)
+    begin = np.flatnonzero(later < len(t))
+    if not len(begin):
+        return None, None
+    rates = (later[begin] - begin) / (t[later[begin]] - t[begin])
+    return float(rates.min()), float(rates.max())
 
 
 def _bus(bus: BusTotals) -> dict[str, Any]:

@@ -26,6 +26,7 @@ def format_summary(summary: Mapping[str, Any]) -> str:
         *_limits(summary["limits"]),
         *_control(summary["control"]),
         *_bus(summary["bus"]),
+        *_memory(summary.get("memory")),
     ]
     return "\n".join(lines)
 
@@ -96,6 +97,14 @@ def _bus(bus: Mapping[str, Any] | None) -> list[str]:
         ),
         _line("  servos lost", lost),
     ]
+
+
+def _memory(memory: Mapping[str, Any] | None) -> list[str]:
+    if not memory:
+        return []
+    name, most = max(memory.items(), key=lambda item: float(item[1]["growth_bytes"]))
+    growth = _number(most["growth_bytes"], "MB", 2, 1e-6)
+    return [_line("memory", f"grew most in {name}: {growth} after the first 20 s")]
 
 
 def _fell(summary: Mapping[str, Any]) -> str:

@@ -152,6 +152,18 @@ def test_control_rate_and_jitter():
     assert control["steps_by_status"] == {"tracking": 101}
 
 
+def test_a_slow_quarter_of_a_minute_is_seen_in_the_rates_of_windows():
+    periods = [0.02] * 1000 + [0.025] * 600 + [0.02] * 1000
+    control = summarise(series_of(np.concatenate(([0.0], np.cumsum(periods)))), RUN)["control"]
+    assert control["rate_slowest_10_s_hz"] == pytest.approx(40.0, rel=1e-3)
+    assert control["rate_fastest_10_s_hz"] == pytest.approx(50.0, rel=1e-3)
+
+
+def test_a_run_shorter_than_a_window_has_no_rate_of_windows():
+    control = summarise(series_of(np.arange(400) * 0.02), RUN)["control"]
+    assert control["rate_slowest_10_s_hz"] is None
+
+
 def test_limits_name_the_first_joint_at_the_end_of_its_range():
     def change(t):
         return {
