@@ -213,6 +213,9 @@ class MockBusConfig:
         0.1, "friction of the gear, less than the stall torque [N m]", low=0.0, high=10.0
     )
     wire_time: bool = parameter(True, "let bytes take the time that the baud rate says")
+    scenario: str = parameter(
+        "", "file of faults with their times (docs/faults.md), empty for none"
+    )
 
     def __post_init__(self) -> None:
         body_hz = self.step_hz / self.steps_per_body_step

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
+from typing import Protocol
 
 from snake_control.mock.firmware import execute
 from snake_control.mock.protocol import BROADCAST_ID, InstructionPacket, Parser
@@ -33,11 +34,29 @@ class Reply:
     data: bytes
 
 
+class Filter(Protocol):
+    """What a disturbed line does to packets."""
+
+    @property
+    def frozen(self) -> bool:
+        """Whether nothing passes."""
+
+    def passes(self, servo: Servo) -> bool:
+        """Whether an instruction reaches a servo."""
+
+    def spoil(self, servo: Servo, reply: bytes) -> tuple[bytes, float]:
+        """Return what becomes of a servo's reply, and by how much it is late [s]."""
+
+    def echo(self, sent: bytes, at: float) -> Reply | None:
+        """Return what comes back of the host's own bytes, sent until ``at``."""
+
+
 class Bus:
     """A half-duplex wire with servos on it; reads no clock.
 
     Attributes:
         servos: all servos, also such that share an id.
+        filter: what disturbs the line, if something does.
     """
 
     def __init__(self, servos: Sequence[Servo], *, wire_time: bool = True) -> None:
@@ -48,6 +67,7 @@ class Bus:
             wire_time: whether bytes take their time; if not, only return delays count.
         """
         self.servos = tuple(servos)
+        self.filter: Filter | None = None
         self._wire_time = wire_time
         self._parser = Parser()
         self._baud_rate = 0.0
@@ -70,12 +90,15 @@ class Bus:
         if baud_rate != self._baud_rate or now - self._heard_at > GAP_S:
             self._parser.reset()
         self._baud_rate, self._heard_at = baud_rate, now
-        if baud_rate <= 0:
+        if baud_rate <= 0 or (self.filter is not None and self.filter.frozen):
             return []
         byte_time = BITS_PER_BYTE / baud_rate if self._wire_time else 0.0
         start = max(now, self._sent_until)
         self._sent_until = start + len(data) * byte_time
         replies = []
+        echo = None if self.filter is None else self.filter.echo(data, self._sent_until)
+        if echo is not None:
+            replies.append(echo)
         for end, packet in self._parser.feed(data):
             reply = self._answer(packet, start + end * byte_time, byte_time)
             if reply is not None:
@@ -84,13 +107,23 @@ class Bus:
 
     def _answer(self, packet: InstructionPacket, at: float, byte_time: float) -> Reply | None:
         answers = []
+        late = 0.0
+        disturbed = self.filter
         for servo in self.servos:
             if packet.id not in (servo.id, BROADCAST_ID) or not _hears(servo, self._baud_rate):
                 continue
+            if disturbed is not None and not disturbed.passes(servo):
+                continue
             delay = servo.return_delay_s
             status = execute(servo, packet)
-            if status is not None:
-                answers.append((delay, status.to_bytes()))
+            if status is None:
+                continue
+            data = status.to_bytes()
+            if disturbed is not None:
+                data, delayed = disturbed.spoil(servo, data)
+                late = max(late, delayed)
+            if data:
+                answers.append((delay, data))
         if not answers:
             return None
         data = answers[0][1]
@@ -98,11 +131,12 @@ class Bus:
             data = _collide(data, other)
         start = max(at + min(delay for delay, _ in answers), self._replied_until)
         self._replied_until = start + len(data) * byte_time
-        return Reply(self._replied_until, data)
+        # A late reply does not keep the line: others may speak meanwhile.
+        return Reply(self._replied_until + late, data)
 
 
 def _hears(servo: Servo, baud_rate: float) -> bool:
-    return abs(servo.baud_rate - baud_rate) <= RATE_TOLERANCE * servo.baud_rate
+    return servo.powered and abs(servo.baud_rate - baud_rate) <= RATE_TOLERANCE * servo.baud_rate
 
 
 def _collide(first: bytes, second: bytes) -> bytes:

@@ -129,10 +129,16 @@ def registers_in(address: int, size: int) -> tuple[Register, ...]:
 class RegisterFile:
     """The values of one servo's control table, by name or as bytes."""
 
-    def __init__(self) -> None:
+    def __init__(self, defaults: Mapping[str, int] | None = None) -> None:
+        """Fill in the defaults.
+
+        Args:
+            defaults: values that differ from the AX-12A's, by register name.
+        """
         self._bytes = bytearray(TABLE_SIZE)
-        for register in TABLE:
-            self[register.name] = register.default
+        self._defaults = {r.name: r.default for r in TABLE} | dict(defaults or {})
+        for name, value in self._defaults.items():
+            self[name] = value
 
     def __getitem__(self, name: str) -> int:
         return int.from_bytes(self._bytes[_SPAN[name]], "little")
@@ -153,4 +159,4 @@ class RegisterFile:
         """Give the RAM area its power-on values."""
         for register in TABLE:
             if not register.eeprom:
-                self[register.name] = register.default
+                self[register.name] = self._defaults[register.name]

@@ -22,11 +22,12 @@ _RATES: dict[int, int] = {
 
 
 class PtyPort:
-    """The servos' end of a serial line.
+    """The servos' end of a serial line; it can be unplugged, as a USB adapter can.
 
     Attributes:
         link: the path that a client opens.
         device: the device that the link leads to.
+        plugged: whether it is there.
     """
 
     def __init__(self, link: str | Path) -> None:
@@ -40,8 +41,12 @@ class PtyPort:
             raise BusError(
                 errno.EEXIST, "exists and is no symbolic link; it is not replaced", str(link)
             )
-        self._master, self._slave = pty.openpty()
         self._open = True
+        self._plug()
+
+    def _plug(self) -> None:
+        self._master, self._slave = pty.openpty()
+        self.plugged = True
         try:
             # Echo and line editing would garble a binary protocol until the client sets the port.
             tty.setraw(self._slave)
@@ -51,8 +56,23 @@ class PtyPort:
         except OSError as error:
             self._close_descriptors()
             raise BusError(
-                error.errno, f"cannot be made a link to a port: {error.strerror}", str(link)
+                error.errno, f"cannot be made a link to a port: {error.strerror}", str(self.link)
             ) from error
+
+    def unplug(self) -> None:
+        """Vanish: the link and the device go, and whoever has the port open gets errors."""
+        if self.plugged:
+            self._remove_link()
+            self._close_descriptors()
+
+    def replug(self) -> None:
+        """Come back behind the same link.
+
+        Raises:
+            BusError: the link cannot be made.
+        """
+        if self._open and not self.plugged:
+            self._plug()
 
     def __enter__(self) -> PtyPort:
         return self
@@ -66,7 +86,7 @@ class PtyPort:
         self.close()
 
     def fileno(self) -> int:
-        """File descriptor that becomes readable when a client has written."""
+        """File descriptor that becomes readable when a client has written; not while unplugged."""
         return self._master
 
     @property
@@ -83,17 +103,20 @@ class PtyPort:
 
     def write(self, data: bytes) -> None:
         """Send bytes to the client; what a client that does not read leaves no room for is lost."""
+        if not self.plugged:
+            return
         with contextlib.suppress(BlockingIOError):
             os.write(self._master, data)
 
     def close(self) -> None:
         """Remove the link, if it is still this port's, and close the pseudo terminal."""
-        if not self._open:
-            return
+        self._open = False
+        self.unplug()
+
+    def _remove_link(self) -> None:
         with contextlib.suppress(OSError):
             if os.readlink(self.link) == self.device:
                 self.link.unlink()
-        self._close_descriptors()
 
     def _put_link(self) -> None:
         # Renaming is atomic: a client finds the old port or the new one, never none.
@@ -106,7 +129,7 @@ class PtyPort:
             raise
 
     def _close_descriptors(self) -> None:
-        self._open = False
+        self.plugged = False
         # An open slave keeps the master readable while no client is there; it goes last.
         os.close(self._master)
         os.close(self._slave)

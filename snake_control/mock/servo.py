@@ -8,14 +8,17 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from snake_control.mock import mechanics, units
+from snake_control.mock import disturbance, mechanics, units
 from snake_control.mock.control_table import BY_NAME, RegisterFile, registers_in
 from snake_control.mock.health import Health, HealthParameters
+from snake_control.mock.models import AX_12A, Model
 from snake_control.mock.protocol import ErrorBit
 from snake_control.mock.sensor import Sensor
 
 _REST_RAD_S = 1e-3
 _REST_TIME_S = 0.1
+# Output this near to the torque limit counts as all that the servo has.
+_AT_THE_LIMIT = 0.99
 
 
 @dataclasses.dataclass(frozen=True)
@@ -54,7 +57,8 @@ class Servo:
         registers: the control table; change it through ``store`` or ``store_bytes``.
         motion: state of the shaft.
         health: temperature and overload.
-        supply_voltage_v: voltage now [V].
+        disturbance: what acts on it from outside.
+        powered: whether it has its supply; without, it neither hears nor moves by itself.
         waiting: address and bytes of a REG_WRITE that waits for its ACTION.
         id: the id that it answers to.
         baud_rate: bits per second that it listens at, 2000000 / (register + 1).
@@ -67,6 +71,7 @@ class Servo:
         servo_id: int,
         parameters: ServoParameters | None = None,
         *,
+        model: Model = AX_12A,
         angle_rad: float = 0.0,
         eeprom: Mapping[str, int] | None = None,
         rng: np.random.Generator | None = None,
@@ -75,7 +80,8 @@ class Servo:
 
         Args:
             servo_id: 0 to 253.
-            parameters: of the motor and the firmware.
+            parameters: of the motor and the firmware; by default the model's.
+            model: which of the AX servos it is.
             angle_rad: angle of the shaft, counter-clockwise from position 512 [rad].
             eeprom: values that differ from the factory's, by register name.
             rng: for what the position sensor reads in its dead zone.
@@ -83,8 +89,9 @@ class Servo:
         Raises:
             ValueError: a register that is no EEPROM, or a value outside its range.
         """
-        self.parameters = parameters or ServoParameters()
-        self.registers = RegisterFile()
+        self.parameters = parameters or ServoParameters(motor=model.motor)
+        self.registers = RegisterFile(model.defaults)
+        self.registers["model_number"] = model.number
         for name, value in {"id": servo_id, **(eeprom or {})}.items():
             register = BY_NAME[name]
             if not register.eeprom or not register.low <= value <= register.high:
@@ -93,11 +100,36 @@ class Servo:
         self.motion = mechanics.Motion(angle_rad=angle_rad)
         self._sensor = Sensor(rng or np.random.default_rng(servo_id))
         self.health = Health(self.parameters.health.ambient_c)
+        self.disturbance = disturbance.NONE
         self.supply_voltage_v = self.parameters.supply_voltage_v
-        self.power_cycle()
+        self.power_on()
+
+    @property
+    def supply_voltage_v(self) -> float:
+        """Voltage of the supply [V]."""
+        return self._supply_voltage_v
+
+    @supply_voltage_v.setter
+    def supply_voltage_v(self, voltage_v: float) -> None:
+        if not 0 <= voltage_v <= 25.5:
+            raise ValueError(f"supply_voltage_v = {voltage_v!r}: give 0 to 25.5")
+        self._supply_voltage_v = voltage_v
 
     def power_cycle(self) -> None:
         """Switch the power off and on: RAM returns to its defaults, the shaft stays."""
+        self.power_off()
+        self.power_on()
+
+    def power_off(self) -> None:
+        """Take the supply away: the shaft is free, and the RAM is lost."""
+        self.powered = False
+        self._driven = False
+        self._drive: mechanics.Drive = mechanics.OpenLoop()
+        self._executing = False
+
+    def power_on(self) -> None:
+        """Give it its supply: RAM has its defaults, Goal Position is where the shaft is."""
+        self.powered = True
         r = self.registers
         r.reset_ram()
         r["torque_limit"] = r["max_torque"]
@@ -108,6 +140,7 @@ class Servo:
         self._tripped = ErrorBit.NONE
         self._executing = False
         self._resting_for_s = 0.0
+        self._frozen: tuple[int, int] | None = None
         self.health.overloaded_for_s = 0.0
         self._refresh()
 
@@ -128,27 +161,39 @@ class Servo:
 
     def step(self, dt: float, load_nm: float = 0.0) -> None:
         """Let ``dt`` seconds pass under a load: the torque that holding the joint takes [N m]."""
-        p, motion, drive = self.parameters, self.motion, self._drive
-        mechanics.advance(motion, drive, p.motor, load_nm, self.supply_voltage_v, dt)
+        p, motion, drive, outside = self.parameters, self.motion, self._drive, self.disturbance
+        angle = motion.angle_rad
+        load_nm += outside.extra_load_nm
+        mechanics.advance(motion, drive, p.motor, load_nm, self._supply_voltage_v, dt)
+        if outside.shaft_blocked:
+            motion.angle_rad, motion.speed_rad_s = angle, 0.0
         self._sensor.step(motion.angle_rad, dt)
         self.health.step(p.health, motion.output, self._overloaded(load_nm), dt)
-        self._watch()
+        if outside.temperature_c is not None:
+            self.health.temperature_c = outside.temperature_c
+        if self.powered:
+            self._watch()
         if self._executing:
             self._follow_execution(drive, dt)
 
     def _overloaded(self, load_nm: float) -> bool:
-        """Whether the load is more than torque limit and gear friction carry together."""
+        """Whether the load is more than torque limit and gear friction carry together.
+
+        A shaft that is held fast loads the servo with all the output that its drive gives.
+        """
         limit = self._torque_limit
         if not self._driven or limit == 0:
             return False
+        if self.disturbance.shaft_blocked and abs(self.motion.output) >= _AT_THE_LIMIT * limit:
+            return True
         motor = self.parameters.motor
-        carried = limit * motor.torque(self.supply_voltage_v) + motor.friction_torque_nm
+        carried = limit * motor.torque(self._supply_voltage_v) + motor.friction_torque_nm
         return abs(load_nm) > carried
 
     def _watch(self) -> None:
         self._conditions = self.health.conditions(
             self.parameters.health,
-            self.supply_voltage_v,
+            self._supply_voltage_v,
             self._voltage_limits_v,
             self._temperature_limit_c,
         )
@@ -239,9 +284,19 @@ class Servo:
     def measure(self) -> None:
         """Fill the Present registers and Moving."""
         r, motion, sensor = self.registers, self.motion, self._sensor
-        r["present_position"] = sensor.position(motion.angle_rad)
-        r["present_speed"] = sensor.speed(motion.speed_rad_s, self._speed_unit_rad_s)
+        if not self.disturbance.frozen_sensor:
+            self._frozen = None
+        if self._frozen is None:
+            seen = (
+                sensor.position(motion.angle_rad),
+                sensor.speed(motion.speed_rad_s, self._speed_unit_rad_s),
+            )
+            if self.disturbance.frozen_sensor:
+                self._frozen = seen
+        else:
+            seen = self._frozen
+        r["present_position"], r["present_speed"] = seen
         r["present_load"] = units.signed_magnitude(motion.output * units.OUTPUT_STEPS)
-        r["present_voltage"] = min(max(round(self.supply_voltage_v * 10), 0), 255)
+        r["present_voltage"] = min(max(round(self._supply_voltage_v * 10), 0), 255)
         r["present_temperature"] = min(max(round(self.health.temperature_c), 0), 255)
         r["moving"] = int(self._executing)

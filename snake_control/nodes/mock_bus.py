@@ -15,13 +15,17 @@ from geometry_msgs.msg import PoseStamped
 from numpy.random import Generator, SeedSequence
 from rclpy.node import Node
 from snake_interfaces.msg import PlantState as PlantStateMessage
+from snake_interfaces.srv import InjectFault
+from std_srvs.srv import Trigger
 
 from snake_control.config import Config, MockBusConfig
-from snake_control.errors import BusError, ConfigError
+from snake_control.errors import BusError, ConfigError, SnakeError
 from snake_control.mock.bus import Bus
+from snake_control.mock.faults import Fault
 from snake_control.mock.mechanics import MotorParameters
 from snake_control.mock.motion_capture import CapturedPose, MotionCapture, Noise
 from snake_control.mock.port import PtyPort
+from snake_control.mock.scenario import load_scenario
 from snake_control.mock.server import Server
 from snake_control.mock.servo import Servo, ServoParameters
 from snake_control.mock.simulation import BodySimulation, Mounting, Snapshot
@@ -91,7 +95,21 @@ class MockBus(Node):
 
         self._port = PtyPort(self._own.port)
         bus = Bus(servos, wire_time=self._own.wire_time)
-        self._server = Server(self._port, bus, self._simulation, time.monotonic)
+        self._server = Server(
+            self._port,
+            bus,
+            self._simulation,
+            time.monotonic,
+            seed=self._own.seed,
+            log=self.get_logger().warning,
+        )
+        if self._own.scenario:
+            self._server.schedule(load_scenario(self._own.scenario))
+        for service, callback in (
+            (topics.INJECT_FAULT, self._inject_fault),
+            (topics.CLEAR_FAULTS, self._clear_faults),
+        ):
+            self.create_service(service.type, service.name, callback)
         self._reporter = threading.Thread(target=self._report, name="reporter", daemon=True)
         self._server.start()
         self._reporter.start()
@@ -108,6 +126,33 @@ class MockBus(Node):
         self._reporter.join()
         self._server.stop()
         self._port.close()
+
+    def _inject_fault(
+        self, request: InjectFault.Request, response: InjectFault.Response
+    ) -> InjectFault.Response:
+        try:
+            fault = Fault(
+                kind=request.fault,
+                ids=tuple(request.ids),
+                duration_s=request.duration,
+                value=request.value or None,
+                probability=request.probability,
+            )
+            self._server.inject(fault)
+        except SnakeError as error:
+            response.success, response.message = False, str(error)
+        else:
+            response.success, response.message = True, str(fault)
+        return response
+
+    def _clear_faults(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        try:
+            response.message = f"{self._server.clear_faults()} faults ended"
+        except SnakeError as error:
+            response.success, response.message = False, str(error)
+        else:
+            response.success = True
+        return response
 
     def _check(self) -> None:
         self._server.check()

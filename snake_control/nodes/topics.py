@@ -27,6 +27,7 @@ from snake_interfaces.msg import (
     PlantState,
     PoseStatus,
 )
+from snake_interfaces.srv import InjectFault
 from std_srvs.srv import SetBool, Trigger
 from visualization_msgs.msg import MarkerArray
 
@@ -95,6 +96,8 @@ SET_TORQUE = Service("~/set_torque", SetBool)
 RECOVER = Service("~/recover", Trigger)
 EMERGENCY_STOP = Service("~/emergency_stop", Trigger)
 RESET_EMERGENCY_STOP = Service("~/reset_emergency_stop", Trigger)
+INJECT_FAULT = Service("~/inject_fault", InjectFault)
+CLEAR_FAULTS = Service("~/clear_faults", Trigger)
 ENABLE = Service("~/enable", SetBool)
 START = Service("~/start", Trigger)
 STOP = Service("~/stop", Trigger)

@@ -147,6 +147,70 @@ def test_it_ends_on_request_and_takes_its_link_away(mock):
     assert not os.path.lexists(mock.link)
 
 
+def test_other_servos_can_be_asked_for(tmp_path):
+    mock = Mock(
+        tmp_path / "bus", "--ids", "1,5", "--model", "AX-12W", "--wheel", "--degrees=-30,45",
+        "--return-delay", "0", "--volt", "9.5", "--no-wire-time", "--permissive",
+    )  # fmt: skip
+    handler = sdk.PortHandler(str(mock.link))
+    assert handler.setBaudRate(1_000_000)
+    try:
+        assert ping(handler, 5) == 300
+        values = {}
+        for address in (0, 5, 6, 8, 36, 42):
+            for _ in range(ATTEMPTS):
+                value, result, _ = PACKETS.read2ByteTxRx(handler, 5, address)
+                if result == sdk.COMM_SUCCESS:
+                    break
+            values[address] = value
+        # 45 degrees are 153.45 positions; the 5 carries the low byte of register 6 behind it.
+        assert values == {0: 300, 5: 0, 6: 0, 8: 0, 36: 665, 42: 95 + (25 << 8)}
+    finally:
+        handler.closePort()
+        mock.stop()
+
+
+def test_a_scenario_runs_by_the_clock_of_the_servos(tmp_path):
+    scenario = tmp_path / "faults.yaml"
+    scenario.write_text("faults: [{at: 0.5, fault: unplug, duration: 0.5}]")
+    mock = Mock(tmp_path / "bus", "--scenario", str(scenario))
+    wait_for(lambda: not os.path.lexists(mock.link), 10.0, "the end of the port")
+    wait_for(lambda: os.path.lexists(mock.link), 10.0, "the port's return")
+    handler = sdk.PortHandler(str(mock.link))
+    assert handler.setBaudRate(1_000_000)
+    try:
+        assert ping(handler, 1) == 12
+    finally:
+        handler.closePort()
+        mock.process.terminate()
+        output = mock.process.communicate(timeout=10.0)[0]
+    assert "fault: unplug for 0.5 s\nfault over: unplug for 0.5 s\n" in output
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "text"),
+    [
+        (["--scenario", "{none}"], 1, "No such file"),
+        (["--degrees", "170"], 2, "-150 to 150"),
+        (["--degrees", "1,2"], 2, "give one angle, or 11 of them"),
+        (["--volt", "90"], 2, "give 0 to 25.5"),
+        (["--model", "AX-99"], 2, "AX-12W"),
+    ],
+)
+def test_arguments_that_cannot_be_are_refused(tmp_path, arguments, code, text):
+    given = [a.replace("{none}", str(tmp_path / "none.yaml")) for a in arguments]
+    done = subprocess.run(
+        [sys.executable, "-m", "snake_control.mock", "--port-link", str(tmp_path / "bus"), *given],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        timeout=30.0,
+    )
+    assert done.returncode == code
+    assert text in done.stderr
+    assert "Traceback" not in done.stderr
+
+
 def test_an_occupied_path_is_one_line_of_error(tmp_path):
     path = tmp_path / "bus"
     path.write_text("keep me")

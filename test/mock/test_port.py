@@ -1,5 +1,6 @@
 import os
 import select
+import termios
 
 import pytest
 import serial
@@ -92,3 +93,27 @@ def test_a_directory_that_is_not_there_is_named(tmp_path):
     with pytest.raises(BusError, match="nowhere/bus"):
         PtyPort(tmp_path / "nowhere" / "bus")
     assert len(os.listdir("/proc/self/fd")) == before
+
+
+def test_unplugged_it_is_gone_and_whoever_has_it_open_gets_errors(tmp_path):
+    link = tmp_path / "bus"
+    with PtyPort(link) as port, serial.Serial(str(link), 1_000_000) as client:
+        port.unplug()
+        assert not os.path.lexists(link)
+        with pytest.raises((OSError, termios.error)):
+            client.reset_input_buffer()
+        port.write(b"lost")
+        port.unplug()
+
+
+def test_replugged_it_is_back_behind_the_same_link(tmp_path):
+    link = tmp_path / "bus"
+    with PtyPort(link) as port:
+        port.unplug()
+        port.replug()
+        port.replug()
+        with serial.Serial(str(link), 1_000_000, timeout=5.0) as client:
+            port.write(b"here")
+            assert client.read(4) == b"here"
+    port.replug()
+    assert not os.path.lexists(link)

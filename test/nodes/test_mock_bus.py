@@ -6,7 +6,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from snake_control.model.rotation import rotation_from_rpy
-from snake_control.nodes.topics import MOCAP_POSE, PLANT_STATE
+from snake_control.nodes.topics import CLEAR_FAULTS, INJECT_FAULT, MOCAP_POSE, PLANT_STATE
 from support.graph import CONFIG, Graph
 from support.waiting import wait_for
 
@@ -163,6 +163,35 @@ def test_an_occupied_path_is_a_clear_error(graph, link):
     assert process.wait(30.0) == 1
     assert "no symbolic link" in process.output()
     assert "Traceback" not in process.output()
+
+
+def test_faults_come_and_go_by_service(graph, link):
+    start(graph, link)
+    port = open_port(link)
+
+    def answers(servo_id):
+        return PACKETS.ping(port, servo_id)[1] == sdk.COMM_SUCCESS
+
+    def inject(**fields):
+        return graph.call("mock_bus", INJECT_FAULT, INJECT_FAULT.type.Request(**fields))
+
+    wait_for(lambda: answers(2), 10.0, "an answer")
+    response = inject(fault="no_reply", ids=[2])
+    assert (response.success, response.message) == (True, "no_reply servo 2 until cleared")
+    assert not answers(2)
+    wait_for(lambda: answers(3), 10.0, "an answer of another servo")
+    for fields, why in (
+        ({"fault": "gremlins"}, "known are no_reply"),
+        ({"fault": "no_reply", "ids": [99]}, "on the bus are"),
+        ({"fault": "late_reply", "value": 99.0}, "delay [s]"),
+    ):
+        refused = inject(**fields)
+        assert not refused.success
+        assert why in refused.message
+    cleared = graph.call("mock_bus", CLEAR_FAULTS, CLEAR_FAULTS.type.Request())
+    assert (cleared.success, cleared.message) == (True, "1 faults ended")
+    wait_for(lambda: answers(2), 10.0, "an answer again")
+    port.closePort()
 
 
 @pytest.mark.parametrize(
