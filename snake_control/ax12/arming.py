@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
+from typing import NamedTuple
 
 from snake_control.ax12 import control_table as ct
 from snake_control.ax12.bus import Bus
@@ -110,24 +111,39 @@ def read_torque(bus: Bus, joint: JointSetup, retries: int | None = None) -> bool
     return None if reply is None else ct.TORQUE_ENABLE.decode(reply.data, _RAM) != 0
 
 
-def check_armed(bus: Bus, joint: JointSetup) -> tuple[bool | None, str]:
-    """Return Torque Enable as in ``read_torque``, and what is wrong with an armed servo's RAM.
+class Armed(NamedTuple):
+    """What an armed servo's RAM says.
+
+    Attributes:
+        torque_on: Torque Enable.
+        shut_down: whether its Torque Limit is 0, after an alarm.
+        wrong: what is not as ``arm`` left it, empty if nothing.
+    """
+
+    torque_on: bool
+    shut_down: bool
+    wrong: str
+
+
+def check_armed(bus: Bus, joint: JointSetup) -> Armed | None:
+    """Return what became of an armed servo's RAM, ``None`` if it did not answer.
 
     A servo that lost power for a moment answers as before but has lost torque and settings; after
     an alarm its torque limit is 0.
     """
     reply = bus.read(joint.servo_id, _RAM, _WATCHED, retries=0)
     if reply is None:
-        return None, ""
+        return None
     torque = ct.TORQUE_ENABLE.decode(reply.data, _RAM) != 0
+    shut_down = ct.TORQUE_LIMIT.decode(reply.data, _RAM) == 0
     wrong = ""
-    if ct.TORQUE_LIMIT.decode(reply.data, _RAM) == 0:
+    if shut_down:
         wrong = "torque limit is 0: it switched itself off after an alarm"
     elif not torque:
         wrong = "torque is off: an alarm, or its power failed for a moment"
     elif reply.data[2:6] != _compliance(joint):
         wrong = "its settings are gone: did its power fail for a moment?"
-    return torque, wrong
+    return Armed(torque, shut_down, wrong)
 
 
 def _seed(bus: Bus, joint: JointSetup, servo: ServoInfo) -> Seed:

@@ -30,6 +30,8 @@ _PING, _READ, _WRITE = 1, 2, 3
 # FF FF id length error | parameters | checksum; length counts error, parameters and checksum.
 _LENGTH_INDEX, _ERROR_INDEX, _PARAMETERS = 3, 4, 5
 
+_ERROR_RATE_REQUESTS = 100
+
 _PATIENT_TIMEOUT_S, _PATIENT_RETRIES = 0.05, 3
 
 
@@ -42,13 +44,22 @@ class Reply(NamedTuple):
 
 @dataclasses.dataclass
 class Counters:
-    """What became of the reads of one servo; a retry that succeeds is a retry, not a miss."""
+    """What became of the requests to one servo; a retry that succeeds is a retry, not a miss.
+
+    ``error_rate`` is the share of requests without a good reply at the first try, 0 to 1: an
+    exponential mean over about the last hundred, two seconds at 50 Hz.
+    """
 
     replies: int = 0
     retries: int = 0
     misses: int = 0
     corrupt_replies: int = 0
     misses_in_row: int = 0
+    error_rate: float = 0.0
+
+    def tried_first(self, good: bool) -> None:
+        """Account for the first try of a request."""
+        self.error_rate += ((0.0 if good else 1.0) - self.error_rate) / _ERROR_RATE_REQUESTS
 
 
 class Bus:
@@ -175,6 +186,8 @@ class Bus:
             if attempt:
                 counters.retries += 1
             reply = self._transact(counters, servo_id, instruction, parameters, reply_length)
+            if not attempt:
+                counters.tried_first(reply is not None)
             if reply is not None:
                 counters.replies += 1
                 counters.misses_in_row = 0

@@ -1,8 +1,8 @@
 """All servos of the robot as one thing: velocities in, readings out, one bus cycle at a time.
 
 A cycle is: write (one SYNC_WRITE for goals and speeds, one more if there are wheel-mode servos),
-then read every servo. Reading ends when the cycle's time is up and goes on there in the next cycle,
-so that servos that do not answer cannot keep the others from their commands.
+then read the servos in the order of ``telemetry``. Reading ends when the cycle's time is up, so
+that servos that do not answer cannot keep the others from their commands.
 """
 
 from __future__ import annotations
@@ -21,9 +21,19 @@ from snake_control.ax12.arming import (
 )
 from snake_control.ax12.bus import Bus, Counters
 from snake_control.ax12.feedback import Feedback
+from snake_control.ax12.following import FollowWatch
 from snake_control.ax12.joint import WHEEL_MODE, JointSetup
 from snake_control.ax12.startup import ServoInfo
-from snake_control.ax12.units import JOINT_NO_LOAD_RAD_S, WHEEL_NO_LOAD_RAD_S, error_names
+from snake_control.ax12.telemetry import Request, TelemetrySchedule
+from snake_control.ax12.units import (
+    JOINT_NO_LOAD_RAD_S,
+    MAX_RAW,
+    RAD_S_PER_SPEED_UNIT,
+    WHEEL_NO_LOAD_RAD_S,
+    decode_signed,
+    error_names,
+    ticks_to_rad,
+)
 from snake_control.ax12.velocity import (
     GoalAndSpeed,
     JointModeVelocity,
@@ -33,13 +43,16 @@ from snake_control.ax12.velocity import (
 )
 from snake_control.errors import ServoError
 
-_CHECK_EVERY_CYCLES = 5
+_CHECK_PERIOD_S = 0.1
 _ALARMS_IN_ROW = 2
 
 FEEDBACK_LOST_S = 0.5
 """Without a believable reading of a driven joint for so long the robot must stop."""
 
 _ASKED_IN_VAIN = 2
+
+SLOW_STALE_S = 3.0
+"""Voltage and temperature that were not read for so long are not known any more."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -51,12 +64,14 @@ class Motion:
         look_ahead: see ``VelocityLimits``.
         acceleration: see ``VelocityLimits``.
         lost_after_misses: missed reads in a row after which a servo counts as lost.
+        follow_time: how long a joint may not do what it is told [s] (see ``FollowWatch``).
     """
 
     period: float
     look_ahead: float
     acceleration: float
     lost_after_misses: int
+    follow_time: float = 1.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -65,13 +80,17 @@ class JointReading:
 
     Attributes:
         angle, rate, load: NaN before the first reply; load is a fraction of the maximum output.
-        voltage, temperature: [V], [degC].
+        voltage, temperature: [V], [degC]; NaN when not read for ``SLOW_STALE_S``.
         age: of the reading [s], infinite before the first.
         error_bits: of the last reply.
         online: False once the servo counts as lost.
         torque_on: Torque Enable as last read or acknowledged.
         counters: what became of the reads so far.
         invalid_values: replies that were not believed.
+        shut_down: whether it holds its torque back after an alarm (Torque Limit 0), as last read.
+        error_rate: share of the last requests without a good reply at the first try, 0 to 1.
+        goal: Goal Position last sent or rehearsed [rad]; NaN before, and in wheel mode.
+        goal_speed: Moving Speed with it [rad/s]; in wheel mode with the sign of the output.
     """
 
     joint: JointSetup
@@ -86,6 +105,10 @@ class JointReading:
     torque_on: bool
     counters: Counters
     invalid_values: int
+    shut_down: bool
+    error_rate: float
+    goal: float
+    goal_speed: float
 
 
 class _Servo:
@@ -111,11 +134,14 @@ class _Servo:
         else:
             self.control = JointModeVelocity(limits)
         self.feedback = Feedback(no_load, self.wheel)
+        self.following = FollowWatch(motion.follow_time)
+        self.speed_unit = no_load / MAX_RAW if self.wheel else RAD_S_PER_SPEED_UNIT
         self.torque_on = False
+        self.shut_down = False
         self.heard_at = -math.inf  # last reply to go by
         self.asked_in_vain = 0
         self.alarms_in_row = 0
-        self.sent = GoalAndSpeed(None, 0)
+        self.sent: GoalAndSpeed | None = None
 
     def present(self, now: float) -> Present:
         feedback = self.feedback
@@ -144,9 +170,8 @@ class ServoChain:
         self._lost_after = motion.lost_after_misses
         self._armed = False
         self._written_at = -math.inf
-        self._read_first = 0
-        self._cycles = 0
-        self._check_next = 0
+        self._telemetry = TelemetrySchedule(len(self._servos), motion.period)
+        self._checked_at = clock()
         self._finding = ""
 
     @property
@@ -166,6 +191,12 @@ class ServoChain:
     def joints(self) -> tuple[JointSetup, ...]:
         """The setup of every joint."""
         return tuple(servo.joint for servo in self._servos)
+
+    @property
+    def error_rate(self) -> float:
+        """Share of the last requests to all servos without a good reply at the first try."""
+        rates = [self._counters(servo).error_rate for servo in self._servos]
+        return sum(rates) / len(rates)
 
     def arm(self) -> None:
         """Switch torque on where the joints are.
@@ -187,7 +218,8 @@ class ServoChain:
         self._written_at = self._clock()
         for servo, seed in zip(self._servos, seeds, strict=True):
             servo.sent = servo.control.latch(seed.angle)
-            servo.torque_on = True
+            servo.torque_on, servo.shut_down = True, False
+            servo.following.reset()
             servo.heard_at = self._written_at
             servo.asked_in_vain = servo.alarms_in_row = 0
             servo.feedback.forget()
@@ -225,6 +257,8 @@ class ServoChain:
         wheels: dict[int, bytes] = {}
         for i, servo in enumerate(self._servos):
             present = servo.present(now)
+            if not servo.wheel:
+                servo.following.step(servo.control.velocity, dt, present.angle)
             if velocities is None:
                 sent = servo.control.stop(dt, present)
             else:
@@ -240,34 +274,51 @@ class ServoChain:
         if wheels:
             self._bus.sync_write(ct.MOVING_SPEED.address, wheels)
 
+    def rehearse(self, velocities: Sequence[float] | None) -> None:
+        """Work out one cycle's goals and speeds as ``write`` does, and send nothing.
+
+        ``readings`` shows them. A joint that nobody holds rests wherever it is moved to.
+        """
+        now = self._clock()
+        dt = now - self._written_at
+        self._written_at = now
+        for i, servo in enumerate(self._servos):
+            present = servo.present(now)
+            if math.isnan(present.angle):
+                continue
+            velocity = 0.0 if velocities is None else servo.joint.direction * velocities[i]
+            if velocity == 0.0 or servo.sent is None:
+                servo.sent = servo.control.latch(present.angle)
+            else:
+                servo.sent = servo.control.step(velocity, dt, present)
+
     def read(self, until: float) -> None:
         """Read the servos, all of them if they answer in time.
 
         Args:
             until: time at which to leave the rest to the next cycle.
         """
-        count = len(self._servos)
-        first = self._read_first
-        self._read_first = 0
-        missed = 0
-        for step in range(count):
-            index = (first + step) % count
-            if step and self._clock() >= until:
-                # Every other time begin with the servo that took the time: always the last one
-                # in its cycle, it would have the least chance to be heard.
-                self._read_first = (index - 1) % count if missed % 2 else index
-                break
-            missed = self._read_one(self._servos[index], until)
-        self._cycles += 1
-        if self._cycles % _CHECK_EVERY_CYCLES == 0 and self._clock() < until:
-            self._check_next = (self._check_next + 1) % count
-            servo = self._servos[self._check_next]
-            if not self._is_lost(servo):
-                torque, wrong = check_armed(self._bus, servo.joint)
-                if torque is not None:
-                    servo.torque_on = torque
-                if wrong and self._armed:
-                    self._finding = f"{servo.joint}: {wrong}"
+        begin = self._clock()
+        lost = frozenset(i for i, servo in enumerate(self._servos) if self._is_lost(servo))
+        for number, request in enumerate(self._telemetry.cycle(lost, begin)):
+            if number and self._clock() >= until:
+                return
+            answered = self._read_one(self._servos[request.servo], request, until)
+            self._telemetry.asked(request, begin, answered)
+        now = self._clock()
+        if now - self._checked_at >= _CHECK_PERIOD_S and now < until:
+            self._checked_at = now
+            index = self._telemetry.next_check(lost)
+            if index is not None:
+                self._check(self._servos[index])
+
+    def _check(self, servo: _Servo) -> None:
+        found = check_armed(self._bus, servo.joint)
+        if found is None:
+            return
+        servo.torque_on, servo.shut_down = found.torque_on, found.shut_down
+        if found.wrong and self._armed:
+            self._finding = f"{servo.joint}: {found.wrong}"
 
     def readings(self) -> list[JointReading]:
         """Return every joint as last seen."""
@@ -299,21 +350,25 @@ class ServoChain:
             return f"no believable reading for {FEEDBACK_LOST_S:g} s from " + ", ".join(
                 map(str, unheard)
             )
+        stuck = [servo.joint for servo in self._servos if servo.following.failed]
+        if stuck:
+            return "told to move and not seen moving (blocked, or its sensor is stuck): " + (
+                ", ".join(map(str, stuck))
+            )
         return self._finding
 
-    def _read_one(self, servo: _Servo, until: float) -> int:
-        """Read a servo that is not lost; return how often in a row it did not answer."""
-        if self._is_lost(servo):
-            return 0
-        servo_id = servo.joint.servo_id
-        counters = self._bus.counters.get(servo_id)
+    def _read_one(self, servo: _Servo, request: Request, until: float) -> bool:
+        """Read a servo; return whether it answered."""
         begin = self._clock()
         # A servo that missed before gets one try: time for retries belongs to the others.
-        retries = None if (counters is None or not counters.misses_in_row) and begin < until else 0
-        reply = self._bus.read(servo_id, *ct.FEEDBACK_BLOCK, retries)
+        missed = self._counters(servo).misses_in_row > 0
+        retries = 0 if missed or begin >= until else None
+        reply = self._bus.read(
+            servo.joint.servo_id, ct.PRESENT_POSITION.address, request.length, retries
+        )
         servo.asked_in_vain += 1
         if reply is None:
-            return self._bus.counters[servo_id].misses_in_row
+            return False
         now = 0.5 * (begin + self._clock())
         believed = servo.feedback.take(reply.data, reply.error_bits, now)
         # A wheel does not move by its readings, and has none in the dead zone of its sensor.
@@ -322,26 +377,42 @@ class ServoChain:
             servo.asked_in_vain = 0
         alarmed = reply.error_bits & servo.info.shutdown_bits
         servo.alarms_in_row = servo.alarms_in_row + 1 if alarmed else 0
-        return 0
+        return True
+
+    def _counters(self, servo: _Servo) -> Counters:
+        return self._bus.counters.get(servo.joint.servo_id) or Counters()
 
     def _is_lost(self, servo: _Servo) -> bool:
-        counters = self._bus.counters.get(servo.joint.servo_id)
-        return counters is not None and counters.misses_in_row >= self._lost_after
+        return self._counters(servo).misses_in_row >= self._lost_after
 
     def _reading(self, servo: _Servo, now: float) -> JointReading:
-        joint, feedback = servo.joint, servo.feedback
-        counters = self._bus.counters.get(joint.servo_id, Counters())
+        joint, feedback, sent = servo.joint, servo.feedback, servo.sent
+        counters = self._counters(servo)
+        goal = goal_speed = math.nan
+        if sent is not None:
+            goal_speed = (
+                decode_signed(sent.speed_raw)
+                * servo.speed_unit
+                * (joint.direction if servo.wheel else 1)
+            )
+            if sent.goal_ticks is not None:
+                goal = joint.to_joint(ticks_to_rad(sent.goal_ticks))
+        slow_known = now - feedback.slow_read_at <= SLOW_STALE_S
         return JointReading(
             joint=joint,
             angle=joint.to_joint(feedback.angle),
             rate=joint.direction * feedback.rate,
             load=joint.direction * feedback.load,
-            voltage=feedback.voltage,
-            temperature=feedback.temperature,
+            voltage=feedback.voltage if slow_known else math.nan,
+            temperature=feedback.temperature if slow_known else math.nan,
             age=now - feedback.read_at,
             error_bits=feedback.error_bits,
             online=not self._is_lost(servo),
             torque_on=servo.torque_on,
             counters=dataclasses.replace(counters),
             invalid_values=feedback.invalid_values,
+            shut_down=servo.shut_down,
+            error_rate=counters.error_rate,
+            goal=goal,
+            goal_speed=goal_speed,
         )

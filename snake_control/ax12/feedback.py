@@ -35,6 +35,7 @@ class Feedback:
         temperature: [degC].
         error_bits: of the last reply, good or not.
         read_at: time of the last good reply [s]; minus infinity before the first.
+        slow_read_at: the same for voltage and temperature.
         invalid_values: how many replies were not believed.
     """
 
@@ -54,7 +55,7 @@ class Feedback:
         self.voltage = math.nan
         self.temperature = math.nan
         self.error_bits = 0
-        self.read_at = -math.inf
+        self.read_at = self.slow_read_at = -math.inf
         self.invalid_values = 0
 
     def forget(self) -> None:
@@ -62,14 +63,19 @@ class Feedback:
         self.read_at = -math.inf
 
     def take(self, block: bytes, error_bits: int, now: float) -> bool:
-        """Take the 8 bytes from Present Position on; return whether they were believed.
+        """Take 6 or 8 bytes from Present Position on; return whether they were believed.
 
         Position and speed are refused together when one is out of its range, when the speed is
         more than the servo can turn, or when the position changed faster: readings in the dead
-        zone of a wheel-mode servo (300 to 360 degrees) are of this kind.
+        zone of a wheel-mode servo (300 to 360 degrees) are of this kind. Voltage and temperature,
+        of 8 bytes the last two, do not depend on that.
         """
         self.error_bits = error_bits
         at = ct.PRESENT_POSITION.address
+        if at + len(block) >= ct.PRESENT_TEMPERATURE.end:
+            self.voltage = raw_to_volt(ct.PRESENT_VOLTAGE.decode(block, at))
+            self.temperature = float(ct.PRESENT_TEMPERATURE.decode(block, at))
+            self.slow_read_at = now
         position = ct.PRESENT_POSITION.decode(block, at)
         speed = ct.PRESENT_SPEED.decode(block, at)
         if position > MAX_TICKS or speed > MAX_SIGNED_RAW:
@@ -85,7 +91,5 @@ class Feedback:
         self.angle = angle
         self.rate = rate
         self.load = load_to_fraction(ct.PRESENT_LOAD.decode(block, at))
-        self.voltage = raw_to_volt(ct.PRESENT_VOLTAGE.decode(block, at))
-        self.temperature = float(ct.PRESENT_TEMPERATURE.decode(block, at))
         self.read_at = now
         return True

@@ -22,12 +22,23 @@ class Level(enum.IntEnum):
 
 @dataclasses.dataclass(frozen=True)
 class Thresholds:
-    """From where on a value is worth a warning."""
+    """From where on a value is worth a warning.
+
+    Attributes:
+        temperature_c, voltage_low_v, voltage_high_v: [degC], [V].
+        age_s: of the reading [s].
+        communication_error_rate: share of requests without a good first reply.
+        load: fraction of the maximum output.
+        torque_n_m: what a servo should carry for long [N m].
+    """
 
     temperature_c: float
     voltage_low_v: float
     voltage_high_v: float
     age_s: float
+    communication_error_rate: float = 0.05
+    load: float = 0.9
+    torque_n_m: float = 0.3
 
 
 @dataclasses.dataclass(frozen=True)
@@ -38,8 +49,16 @@ class Verdict:
     text: str
 
 
-def judge(reading: JointReading, thresholds: Thresholds) -> Verdict:
-    """Return the worst of everything that is unusual about one servo."""
+def judge(
+    reading: JointReading, thresholds: Thresholds, expected_torque: float = math.nan
+) -> Verdict:
+    """Return the worst of everything that is unusual about one servo.
+
+    Args:
+        reading: the servo as last seen.
+        thresholds: what is usual.
+        expected_torque: what gravity asks of the joint by the model [N m]; NaN if unknown.
+    """
     if not reading.online:
         return Verdict(Level.ERROR, "lost: it does not answer any more")
     if math.isinf(reading.age):
@@ -49,16 +68,29 @@ def judge(reading: JointReading, thresholds: Thresholds) -> Verdict:
     if reading.error_bits:
         level = Level.ERROR
         reasons.append("reports " + ", ".join(error_names(reading.error_bits)))
+    if reading.shut_down:
+        level = Level.ERROR
+        reasons.append("shut down: its torque limit is 0 after an alarm")
+    warnings = []
     if reading.age > thresholds.age_s:
-        level = max(level, Level.WARN)
-        reasons.append("its reading is old")
+        warnings.append("its reading is old")
     if reading.temperature >= thresholds.temperature_c:
+        warnings.append(f"{reading.temperature:.0f} degC")
+    # NaN is no voltage to warn of.
+    if reading.voltage < thresholds.voltage_low_v or reading.voltage > thresholds.voltage_high_v:
+        warnings.append(f"{reading.voltage:.1f} V")
+    if abs(reading.load) >= thresholds.load:
+        warnings.append(f"load {100 * abs(reading.load):.0f} %")
+    if reading.error_rate >= thresholds.communication_error_rate:
+        warnings.append(f"{100 * reading.error_rate:.0f} % of its replies fail at the first try")
+    if abs(expected_torque) > thresholds.torque_n_m:
+        warnings.append(
+            f"carries {abs(expected_torque):.2f} N m, should carry {thresholds.torque_n_m:g} N m "
+            "for long"
+        )
+    if warnings:
         level = max(level, Level.WARN)
-        reasons.append(f"{reading.temperature:.0f} degC")
-    if not thresholds.voltage_low_v <= reading.voltage <= thresholds.voltage_high_v:
-        level = max(level, Level.WARN)
-        reasons.append(f"{reading.voltage:.1f} V")
-    return Verdict(level, "; ".join(reasons) or "OK")
+    return Verdict(level, "; ".join(reasons + warnings) or "OK")
 
 
 class HealthLog:

@@ -157,6 +157,7 @@ class JointModeVelocity:
 
     Attributes:
         setpoint: x_s [rad].
+        velocity: what the joint is led with, after all limits [rad/s].
     """
 
     def __init__(self, limits: VelocityLimits) -> None:
@@ -167,7 +168,7 @@ class JointModeVelocity:
         self._compliance = limits.compliance_ticks * RAD_PER_TICK
         self._lower = ticks_to_rad(limits.lower_ticks)
         self._upper = ticks_to_rad(limits.upper_ticks)
-        self._velocity = 0.0
+        self.velocity = 0.0
         self._speed_raw = SEED_SPEED_RAW
         self._droop = 0.0
         self._at_rest = 0.0  # [s]
@@ -177,7 +178,7 @@ class JointModeVelocity:
     def latch(self, angle: float) -> GoalAndSpeed:
         """Start holding ``angle`` [rad] at the low speed of activation."""
         self.setpoint = angle
-        self._ramp.velocity = self._velocity = 0.0
+        self._ramp.velocity = self.velocity = 0.0
         self._units.reset()
         self._speed_raw = SEED_SPEED_RAW
         self._droop = 0.0
@@ -209,7 +210,7 @@ class JointModeVelocity:
             velocity = self._ramp.velocity = 0.0
         else:
             self._limit_lead(velocity, dt, present, stale)
-        self._velocity = velocity
+        self.velocity = velocity
         self._at_rest = self._at_rest + dt if velocity == 0.0 else 0.0
         units = self._units.next(velocity)
         if units == 0:
@@ -237,16 +238,16 @@ class JointModeVelocity:
         )
 
     def _limit_lead(self, velocity: float, dt: float, present: Present, stale: bool) -> None:
-        here = present.after(self._oldest, abs(self._velocity) + RAD_S_PER_SPEED_UNIT)
+        here = present.after(self._oldest, abs(self.velocity) + RAD_S_PER_SPEED_UNIT)
         lead = self.setpoint - here
         speed = abs(velocity)
-        slow = max(speed, abs(self._velocity)) < RAD_S_PER_SPEED_UNIT
+        slow = max(speed, abs(self.velocity)) < RAD_S_PER_SPEED_UNIT
         if slow and not stale:
             self._droop += (lead - self._droop) * min(1.0, dt / _DROOP_TIME_S)
             self._droop = min(max(self._droop, -self._compliance), self._compliance)
-        stopping = velocity == 0.0 and self._velocity != 0.0
+        stopping = velocity == 0.0 and self.velocity != 0.0
         if stopping or speed >= _FAST_UNITS * RAD_S_PER_SPEED_UNIT:
-            band = _BAND_TICKS * RAD_PER_TICK + abs(self._velocity) * self._limits.period
+            band = _BAND_TICKS * RAD_PER_TICK + abs(self.velocity) * self._limits.period
             low, high = min(0.0, self._droop) - band, max(0.0, self._droop) + band
         elif velocity != 0.0:
             high = self._compliance + _BAND_TICKS * RAD_PER_TICK
@@ -267,9 +268,14 @@ class JointModeVelocity:
 
 
 class WheelModeVelocity:
-    """Velocity of one servo in wheel mode, as a share of its speed without load."""
+    """Velocity of one servo in wheel mode, as a share of its speed without load.
+
+    Attributes:
+        velocity: what is commanded, after all limits [rad/s].
+    """
 
     def __init__(self, limits: VelocityLimits, no_load_speed: float) -> None:
+        self.velocity = 0.0
         self._ramp = _Ramp(limits)
         self._longest = limits.look_ahead
         self._units = _SigmaDelta(no_load_speed / MAX_RAW, limits.period)
@@ -289,9 +295,10 @@ class WheelModeVelocity:
         del present
         dt = min(max(dt, 0.0), self._longest)
         self._units.elapse(dt)
-        return GoalAndSpeed(None, encode_signed(self._units.next(self._ramp.step(velocity, dt))))
+        self.velocity = self._ramp.step(velocity, dt)
+        return GoalAndSpeed(None, encode_signed(self._units.next(self.velocity)))
 
     def _rest(self) -> GoalAndSpeed:
-        self._ramp.velocity = 0.0
+        self._ramp.velocity = self.velocity = 0.0
         self._units.reset()
         return GoalAndSpeed(None, 0)

@@ -12,13 +12,14 @@ import pytest
 from snake_control.ax12.bus import Bus
 from snake_control.ax12.chain import Motion, ServoChain
 from snake_control.ax12.feedback import Feedback
-from snake_control.ax12.health import HealthLog, Level, Thresholds, judge
+from snake_control.ax12.health import HealthLog, Level, Thresholds, Verdict, judge
 from snake_control.ax12.joint import JointSetup
 from snake_control.ax12.port import SerialPort
 from snake_control.ax12.startup import handshake
 from snake_control.ax12.units import RAD_PER_TICK, RAD_S_PER_SPEED_UNIT, ticks_to_rad
 from snake_control.errors import BusError, ServoError
-from support.scripted_servos import READ, SYNC_WRITE, ScriptedServos, packet
+from support.scripted_servos import PING, READ, SYNC_WRITE, ScriptedServos, packet
+from support.waiting import wait_for
 
 MOTION = Motion(period=0.02, look_ahead=0.15, acceleration=0.0, lost_after_misses=3)
 MODES = {1: "joint", 2: "joint", 3: "wheel"}
@@ -124,9 +125,8 @@ def test_dead_servos_cannot_keep_a_cycle_from_ending(
         return [p[2] for p in servos.instructions(READ)]
 
     servos.answer = lambda i, answer: b"" if i[2] == 1 else answer
-    # Out of time at once: one servo a cycle; the silent one is asked first once more, then the
-    # others have their turn.
-    assert [asked() for _ in range(5)] == [[1], [1], [2], [3], [1]]
+    # Out of time at once: one servo a cycle, each in turn.
+    assert [asked() for _ in range(5)] == [[1], [2], [3], [1], [2]]
 
 
 def move(chain: ServoChain, seconds: float) -> str:
@@ -241,9 +241,14 @@ def test_a_servo_that_lost_power_for_a_moment_is_found(
 ) -> None:
     chain.arm()
     servos.memory[2][24] = 0
-    for _ in range(20):
+
+    def found() -> str:
         read(chain)
+        return chain.fault()
+
+    wait_for(found, 10.0, "a fault")
     assert chain.fault().startswith("joint_2 (servo id 2): torque is off")
+    assert not chain.readings()[1].torque_on
 
 
 def test_an_unplugged_port_is_a_bus_error(chain: ServoChain, servos: ScriptedServos) -> None:
@@ -283,7 +288,9 @@ def test_judgement_and_its_log(chain: ServoChain, servos: ScriptedServos) -> Non
     log = HealthLog()
 
     def look() -> tuple[list[Level], list[tuple[Level, str]]]:
-        read(chain)
+        # Voltage and temperature of one servo a cycle.
+        for _ in JOINTS:
+            read(chain)
         readings = chain.readings()
         verdicts = [judge(reading, THRESHOLDS) for reading in readings]
         return [verdict.level for verdict in verdicts], log.changes(readings, verdicts)
@@ -304,3 +311,119 @@ def test_judgement_and_its_log(chain: ServoChain, servos: ScriptedServos) -> Non
     assert look()[1] == []
     servos.memory[1][43] = 40
     assert look()[1] == [(Level.OK, "joint_1 (servo id 1): OK")]
+
+
+def test_goals_and_speeds_are_shown_in_the_joints_frame(
+    chain: ServoChain, servos: ScriptedServos
+) -> None:
+    assert math.isnan(chain.readings()[0].goal)
+    chain.arm()
+    read(chain)
+    unit = RAD_S_PER_SPEED_UNIT
+    chain.write([10 * unit, 10 * unit, -1.0])
+    one, two, three = chain.readings()
+    ahead = (33 + 1) * RAD_PER_TICK + 10 * unit * 0.15
+    assert (one.goal, two.goal) == pytest.approx((ahead, ahead), abs=RAD_PER_TICK)
+    assert (one.goal_speed, two.goal_speed) == pytest.approx((10 * unit, 10 * unit))
+    assert math.isnan(three.goal)
+    assert three.goal_speed == pytest.approx(-1.0, rel=0.01)
+
+
+def test_a_rehearsal_works_everything_out_and_sends_nothing(
+    chain: ServoChain, servos: ScriptedServos
+) -> None:
+    servos.memory[1][36:38] = (600).to_bytes(2, "little")
+    before = {i: bytes(memory) for i, memory in servos.memory.items()}
+    chain.rehearse([0.5, 0.0, 0.0])
+    assert math.isnan(chain.readings()[0].goal), "where it stands is not known yet"
+    read(chain)
+    for _ in range(3):
+        chain.rehearse([0.5, 0.0, 0.5])
+        read(chain)
+    one, two, three = chain.readings()
+    assert one.goal == pytest.approx(one.angle + 34 * RAD_PER_TICK + 0.075, abs=2 * RAD_PER_TICK)
+    assert one.goal_speed == pytest.approx(0.5, rel=0.02)
+    assert two.goal == two.angle
+    assert three.goal_speed == pytest.approx(0.5, rel=0.02)
+    chain.rehearse(None)
+    assert chain.readings()[0].goal == one.angle
+    assert {p[4] for p in servos.packets} <= {PING, READ}
+    assert {i: bytes(memory) for i, memory in servos.memory.items()} == before
+
+
+def test_the_share_of_failed_first_tries_is_counted(
+    chain: ServoChain, servos: ScriptedServos
+) -> None:
+    for _ in range(3):
+        read(chain)
+    assert chain.error_rate == 0.0
+    servos.answer = lambda i, answer: answer[:-1] + b"\0" if i[2] == 2 else answer
+    read(chain)
+    one, two, _ = chain.readings()
+    assert (one.error_rate, two.error_rate) == (0.0, pytest.approx(0.01))
+    assert chain.error_rate == pytest.approx(0.01 / 3)
+    read(chain)
+    assert chain.readings()[1].error_rate == pytest.approx(0.01 + 0.99 * 0.01)
+
+
+def test_a_lost_servo_that_answers_again_is_seen(chain: ServoChain, servos: ScriptedServos) -> None:
+    servos.answer = lambda i, answer: b"" if i[2] == 2 else answer
+    for _ in range(3):
+        read(chain)
+    assert not chain.readings()[1].online
+    servos.answer = None
+
+    def back() -> bool:
+        read(chain)
+        return chain.readings()[1].online
+
+    wait_for(back, 10.0, "the lost servo")
+
+
+def test_a_joint_that_does_not_follow_stops_the_robot(
+    chain: ServoChain, servos: ScriptedServos
+) -> None:
+    chain.arm()
+    # Positions of scripted servos stay what they are, whatever their goals.
+    fault = move(chain, 20.0)
+    assert fault == (
+        "told to move and not seen moving (blocked, or its sensor is stuck): "
+        "joint_1 (servo id 1), joint_2 (servo id 2)"
+    )
+
+
+def test_a_servo_that_holds_its_torque_back_is_judged_so(
+    chain: ServoChain, servos: ScriptedServos
+) -> None:
+    chain.arm()
+    servos.memory[1][34:36] = bytes(2)
+
+    def found() -> bool:
+        read(chain)
+        return chain.readings()[0].shut_down
+
+    wait_for(found, 10.0, "the torque limit of 0")
+    verdict = judge(chain.readings()[0], THRESHOLDS)
+    assert verdict.level is Level.ERROR
+    assert "shut down" in verdict.text
+
+
+@pytest.mark.parametrize(
+    ("changes", "torque", "text"),
+    [
+        ({"load": -0.95}, 0.0, "load 95 %"),
+        ({"error_rate": 0.08}, 0.0, "8 % of its replies fail at the first try"),
+        ({}, -0.44, "carries 0.44 N m, should carry 0.3 N m for long"),
+        ({"age": 0.2}, math.nan, "its reading is old"),
+        ({"voltage": 13.0}, 0.1, "13.0 V"),
+        ({"voltage": math.nan, "temperature": math.nan}, 0.0, "OK"),
+        ({"load": 0.95, "temperature": 66.0}, 0.0, "66 degC; load 95 %"),
+    ],
+)
+def test_every_threshold_warns(
+    chain: ServoChain, changes: dict[str, float], torque: float, text: str
+) -> None:
+    read(chain)
+    reading = dataclasses.replace(chain.readings()[0], **{"load": 0.0} | changes)  # type: ignore[arg-type]
+    verdict = judge(reading, THRESHOLDS, torque)
+    assert verdict == Verdict(Level.OK if text == "OK" else Level.WARN, text)

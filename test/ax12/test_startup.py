@@ -267,10 +267,12 @@ def test_a_servo_that_lost_its_settings_is_found(
     address: int, value: int, words: str, bus: Bus, servos: ScriptedServos
 ) -> None:
     arm(bus, JOINTS, handshake(bus, JOINTS, MODELS).servos)
-    assert check_armed(bus, JOINTS[0]) == (True, "")
+    assert check_armed(bus, JOINTS[0]) == (True, False, "")
     servos.memory[1][address] = value
     if address == 34:
         servos.memory[1][35] = 0
-    torque, wrong = check_armed(bus, JOINTS[0])
-    assert torque is (address != 24)
-    assert words in wrong
+    found = check_armed(bus, JOINTS[0])
+    assert found is not None
+    assert found.torque_on is (address != 24)
+    assert found.shut_down is (address == 34)
+    assert words in found.wrong
