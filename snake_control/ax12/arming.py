@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 from snake_control.ax12 import control_table as ct
 from snake_control.ax12.bus import Bus
+from snake_control.ax12.eeprom import ServoInfo
 from snake_control.ax12.joint import WHEEL_MODE, JointSetup
-from snake_control.ax12.startup import ServoInfo
 from snake_control.ax12.units import MAX_TICKS, decode_signed, ticks_to_rad
 from snake_control.ax12.velocity import SEED_SPEED_RAW
 from snake_control.errors import ServoError

@@ -20,10 +20,10 @@ from snake_control.ax12.arming import (
     require_off,
 )
 from snake_control.ax12.bus import Bus, Counters
+from snake_control.ax12.eeprom import ServoInfo
 from snake_control.ax12.feedback import Feedback
 from snake_control.ax12.following import FollowWatch
 from snake_control.ax12.joint import WHEEL_MODE, JointSetup
-from snake_control.ax12.startup import ServoInfo
 from snake_control.ax12.telemetry import Request, TelemetrySchedule
 from snake_control.ax12.units import (
     JOINT_NO_LOAD_RAD_S,

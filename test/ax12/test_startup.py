@@ -9,9 +9,10 @@ import pytest
 
 from snake_control.ax12.arming import arm, check_armed, disarm
 from snake_control.ax12.bus import Bus
+from snake_control.ax12.eeprom import ServoInfo
 from snake_control.ax12.joint import JointSetup
 from snake_control.ax12.port import SerialPort
-from snake_control.ax12.startup import ServoInfo, cycle_duration, handshake
+from snake_control.ax12.startup import cycle_duration, handshake
 from snake_control.ax12.units import RAD_PER_TICK, ticks_to_rad
 from snake_control.errors import ServoError
 from support.scripted_servos import SYNC_WRITE, WRITE, ScriptedServos, packet
@@ -276,3 +277,21 @@ def test_a_servo_that_lost_its_settings_is_found(
     assert found.torque_on is (address != 24)
     assert found.shut_down is (address == 34)
     assert words in found.wrong
+
+
+@pytest.mark.parametrize(
+    ("address", "value", "text"),
+    [
+        (18, 4, "does not shut down by itself at: overload; set Alarm Shutdown (address 18) to 36"),
+        (11, 99, "Temperature Limit (address 11) is 99 degC"),
+        (12, 120, "its voltage limits 12.0 to 14.0 V do not hold the 11.1 V"),
+        (15, 1, "Max Torque (address 14) allows 50 % of its torque, less than the 80 % configured"),
+    ],
+)
+def test_settings_that_are_no_error_are_warned_of(
+    address: int, value: int, text: str, bus: Bus, servos: ScriptedServos
+) -> None:
+    servos.memory[2][address] = value
+    joints = (JOINTS[0], joint(2, torque_limit=0.8), JOINTS[2])
+    (warning,) = handshake(bus, joints, MODELS).warnings
+    assert warning.startswith(f"joint_2 (servo id 2): {text}")
