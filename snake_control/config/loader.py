@@ -218,6 +218,7 @@ def _build(shared: Mapping[str, Any], own: Mapping[str, Mapping[str, Any]]) -> C
     for node, cls in _NODE_GROUPS.items():
         names = parameters(cls)
         groups[node] = _group(cls, "", {f: v for f, v in own[node].items() if f in names})
+    groups["bus_driver"] = groups["bus_driver"].for_robot(robot)
     return Config(**groups)
 
 

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 
 from snake_control.config.parameter import parameter
+from snake_control.config.robot import RobotConfig, per_joint
 from snake_control.errors import ConfigError
 
 SDK_BAUD_RATES = (9600, 19200, 57600, 115200, 500000, 1000000)
@@ -44,6 +46,34 @@ class BusDriverConfig:
     torque_off_on_exit: bool = parameter(
         False, "switch torque off when the node ends (a raised head then falls)"
     )
+    lower_before_torque_off: bool = parameter(
+        False, "move slowly to lowering_angles_rad before torque goes off on purpose"
+    )
+    lowering_angles_rad: tuple[float, ...] = parameter(
+        (0.0,),
+        "where the joints stand when torque goes off, one for all or for each joint [rad]",
+        low=-2 * math.pi,
+        high=2 * math.pi,
+    )
+    lowering_speed_rad_s: float = parameter(
+        0.2,
+        "speed of the joint that has the longest way to go; the others arrive with it [rad/s]",
+        low=0.02,
+        high=2.0,
+    )
+    reconnect_first_s: float = parameter(
+        0.5, "after a lost port: time until it is opened again [s]", low=0.05, high=60.0
+    )
+    reconnect_longest_s: float = parameter(
+        5.0,
+        "each try that fails doubles the time until the next, up to this [s]",
+        low=0.05,
+        high=600.0,
+    )
+    dry_run: bool = parameter(
+        False,
+        "write nothing to any servo: read them, and say what each command would make of them",
+    )
     feedback_timeout_s: float = parameter(
         0.1,
         "while the reading of any joint is older, joint_states is not published [s]",
@@ -54,6 +84,22 @@ class BusDriverConfig:
     temperature_warn_c: float = parameter(60.0, "warn from this temperature [degC]", low=0.0)
     voltage_low_warn_v: float = parameter(9.5, "warn below this voltage [V]", low=0.0)
     voltage_high_warn_v: float = parameter(12.6, "warn above this voltage [V]", low=0.0)
+    communication_error_warn: float = parameter(
+        0.05,
+        "warn from this share of requests without a good reply at the first try",
+        low=0.0,
+        high=1.0,
+    )
+    load_warn: float = parameter(
+        0.8, "warn from this load, as share of the largest output", low=0.0, high=1.0
+    )
+    torque_warn_n_m: float = parameter(
+        0.3,
+        "warn when gravity asks more of a joint, by the model: what an AX-12 should carry for "
+        "long, a fifth of its stall torque [N m]",
+        low=0.0,
+        high=1e3,
+    )
     autostart: bool = parameter(True, "configure and activate without a lifecycle manager")
 
     def __post_init__(self) -> None:
@@ -64,6 +110,38 @@ class BusDriverConfig:
                 f"at least two bus cycles, {2.0 / self.rate_hz:g} s at rate_hz = "
                 f"{self.rate_hz:g}, or joints pause between two goals",
             )
+        if self.reconnect_longest_s < self.reconnect_first_s:
+            raise ConfigError(
+                "reconnect_longest_s",
+                self.reconnect_longest_s,
+                f"at least reconnect_first_s = {self.reconnect_first_s:g}",
+            )
+        if self.voltage_high_warn_v <= self.voltage_low_warn_v:
+            raise ConfigError(
+                "voltage_high_warn_v",
+                self.voltage_high_warn_v,
+                f"more than voltage_low_warn_v = {self.voltage_low_warn_v:g}",
+            )
+
+    def for_robot(self, robot: RobotConfig) -> BusDriverConfig:
+        """Return this with one lowering angle for each joint.
+
+        Raises:
+            ConfigError: as many as there are joints, or one; and inside the joints' ranges if they
+                are to be used.
+        """
+        field = "lowering_angles_rad"
+        angles = per_joint(field, self.lowering_angles_rad, robot.joints)
+        if self.lower_before_torque_off:
+            for i, angle in enumerate(angles):
+                lower, upper = robot.joint_range(i + 1)
+                if not lower <= angle <= upper:
+                    raise ConfigError(
+                        f"{field}[{i}]",
+                        angle,
+                        f"inside the range of joint {i + 1}, {lower:g} to {upper:g}",
+                    )
+        return dataclasses.replace(self, lowering_angles_rad=angles)
 
 
 @dataclasses.dataclass(frozen=True)
