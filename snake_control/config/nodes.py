@@ -30,6 +30,13 @@ class BusDriverConfig:
     lost_after_misses: int = parameter(
         25, "missed reads in a row after which a servo counts as lost", low=1, high=1000
     )
+    follow_timeout_s: float = parameter(
+        1.0,
+        "stop when a joint was told to move for so long and is not seen moving: blocked, or its "
+        "sensor is stuck [s]",
+        low=0.2,
+        high=60.0,
+    )
     look_ahead_s: float = parameter(
         0.15,
         "how far ahead of the joint its goal is kept, as time at its speed [s]; margin and slope "

@@ -69,6 +69,15 @@ class CommandBuffer:
         if asked_at - self._heard_at <= _PAUSE_S:
             self._waiting_since = self._heard_at = now
 
+    def wait_for_start(self, now: float) -> None:
+        """Take no command that somebody was sending already when the driver started.
+
+        He may have asked for it all the time, of a driver that ran before; a pause or a zero shows
+        that he means it.
+        """
+        self._command = None
+        self._waiting_since = self._heard_at = now
+
     def newest(self, now: float) -> tuple[tuple[float, ...] | None, str]:
         """Return the velocities to execute, ``None`` to hold, and why."""
         command = self._command

@@ -1,27 +1,33 @@
 """Node ``bus_driver``: joint velocities to AX-12 servos, their state to the graph.
 
 Lifecycle: configure opens the port and checks every servo, activate seeds and arms them, deactivate
-lets them hold, cleanup closes the port. With ``autostart`` (default) configure and activate happen
-in the first turns of the executor, so that a signal comes between them, and a failure ends the
-process with one message.
+lets them hold, cleanup takes the torque and closes the port; after an error the servos hold by
+themselves and the port is closed. With ``autostart`` (default) configure and activate happen in the
+first turns of the executor, so that a signal comes between them, and a failure ends the process
+with one message.
 """
 
 from __future__ import annotations
 
+import math
 import sys
 import time
+from collections.abc import Callable
 from typing import Any
 
 from rclpy.clock import Clock, ClockType
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from snake_interfaces.msg import JointVelocityCommand
+from std_msgs.msg import Bool
 from std_srvs.srv import SetBool, Trigger
 
-from snake_control.ax12.health import HealthLog, Level, Thresholds, Verdict, judge
+from snake_control.ax12.health import HealthLog, Level, Thresholds, judge
 from snake_control.errors import SnakeError
 from snake_control.nodes import topics
+from snake_control.nodes.bus_load import StaticLoad
 from snake_control.nodes.bus_loop import BusLoop
 from snake_control.nodes.bus_messages import (
+    Health,
     InvalidCommandError,
     StateMessages,
     checked_velocities,
@@ -29,7 +35,7 @@ from snake_control.nodes.bus_messages import (
     no_diagnostics,
     time_message,
 )
-from snake_control.nodes.bus_snapshot import Snapshot
+from snake_control.nodes.bus_snapshot import Snapshot, State
 from snake_control.nodes.parameters import NodeParameters
 from snake_control.nodes.process import run
 
@@ -39,6 +45,7 @@ _THREAD_SWITCH_S = 5e-4
 _LOG_PERIOD_S = 1.0
 _CHECK_PERIOD_S = 0.2
 _NS = 1_000_000_000
+_MOVING_RAD = 0.02
 
 
 class BusDriver(LifecycleNode):
@@ -55,7 +62,19 @@ class BusDriver(LifecycleNode):
         driver, names = self._config.bus_driver, self._config.robot.joint_names
         self._messages = StateMessages(names, self._config.servos.ids)
         self._last: Snapshot | None = None
-        self._health = HealthLog()
+        self._health_log = HealthLog()
+        self._health = Health()
+        self._load = StaticLoad(self._config.robot, driver.torque_warn_n_m)
+        self._thresholds = Thresholds(
+            driver.temperature_warn_c,
+            driver.voltage_low_warn_v,
+            driver.voltage_high_warn_v,
+            driver.feedback_timeout_s,
+            driver.communication_error_warn,
+            driver.load_warn,
+            driver.torque_warn_n_m,
+        )
+        self._rehearsed: dict[str, float] = {}
         self._failure: SnakeError | None = None
         self._starting = driver.autostart
         self._joint_stamp_ns = 0
@@ -64,9 +83,11 @@ class BusDriver(LifecycleNode):
         self._joint_states = self._publisher(topics.JOINT_STATES)
         self._bus_state = self._publisher(topics.BUS_STATE)
         self._diagnostics = self._publisher(topics.DIAGNOSTICS)
+        self._emergency_active = self._publisher(topics.EMERGENCY_STOP_ACTIVE)
         self._loop = BusLoop(
             self._config, self._publish, self.get_logger().warning, self.get_logger().error
         )
+        self._tell_emergency()
         command = topics.JOINT_VELOCITY_COMMAND
         self.create_subscription(command.type, command.name, self._take_command, command.qos)
         self._serve(topics.SET_TORQUE, self._set_torque)
@@ -89,7 +110,11 @@ class BusDriver(LifecycleNode):
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Open the port and check all servos."""
-        return self._attempt(self._loop.open)
+        result = self._attempt(self._loop.open)
+        heavy = self._load.too_much(self._config.robot.start_joint_angles_rad)
+        if result == TransitionCallbackReturn.SUCCESS and heavy:
+            self.get_logger().warning(f"in the start posture {heavy}")
+        return result
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Seed goals, write RAM settings, switch torque on."""
@@ -104,13 +129,26 @@ class BusDriver(LifecycleNode):
         return super().on_deactivate(state)
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Close the port."""
-        self._loop.close()
+        """Take the torque, after a lowering if configured, and close the port."""
+        self._loop.close(torque_off=True)
         self._last = None
         return TransitionCallbackReturn.SUCCESS
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Hold and close the port."""
+        """Hold, take the torque if configured, close the port."""
+        return self._end()
+
+    def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Hold and close the port, whatever went wrong in a transition; configure begins anew."""
+        self.get_logger().error(
+            f"a transition from {state.label!r} failed unexpectedly: the servos hold by themselves "
+            "and the port is closed; configure the driver again"
+        )
+        self._loop.close(torque_off=False)
+        self._last = None
+        return TransitionCallbackReturn.SUCCESS
+
+    def _end(self) -> TransitionCallbackReturn:
         self._loop.close()
         self._last = None
         return TransitionCallbackReturn.SUCCESS
@@ -184,7 +222,7 @@ class BusDriver(LifecycleNode):
             stamp = time_message(stamp_ns)
             self._joint_states.publish(self._messages.joint_state(snapshot, stamp))
         stamp = time_message(now_ns - round(_NS * max(0.0, now - snapshot.read_at)))
-        self._bus_state.publish(self._messages.bus_state(snapshot, stamp))
+        self._bus_state.publish(self._messages.bus_state(snapshot, self._health, stamp))
 
     def _publish_diagnostics(self) -> None:
         snapshot, driver = self._last, self._config.bus_driver
@@ -192,19 +230,19 @@ class BusDriver(LifecycleNode):
         if snapshot is None:
             self._diagnostics.publish(no_diagnostics(driver.port, stamp))
             return
-        thresholds = Thresholds(
-            driver.temperature_warn_c,
-            driver.voltage_low_warn_v,
-            driver.voltage_high_warn_v,
-            driver.feedback_timeout_s,
+        torques = self._load.expected([reading.angle for reading in snapshot.readings])
+        verdicts = tuple(
+            judge(reading, self._thresholds, torque)
+            for reading, torque in zip(snapshot.readings, torques, strict=True)
         )
-        verdicts = [judge(reading, thresholds) for reading in snapshot.readings]
-        self._log_changes(snapshot, verdicts)
-        self._diagnostics.publish(diagnostics(snapshot, verdicts, driver.port, stamp))
+        self._health = Health(verdicts, torques)
+        self._log_changes(snapshot)
+        self._log_rehearsal(snapshot)
+        self._diagnostics.publish(diagnostics(snapshot, self._health, driver.port, stamp))
 
-    def _log_changes(self, snapshot: Snapshot, verdicts: list[Verdict]) -> None:
+    def _log_changes(self, snapshot: Snapshot) -> None:
         log = self.get_logger()
-        for level, text in self._health.changes(snapshot.readings, verdicts):
+        for level, text in self._health_log.changes(snapshot.readings, self._health.verdicts):
             if level is Level.OK:
                 log.info(text)
             elif level is Level.ERROR:
@@ -212,27 +250,54 @@ class BusDriver(LifecycleNode):
             else:
                 log.warning(text)
 
+    def _log_rehearsal(self, snapshot: Snapshot) -> None:
+        """Say in a dry run what would be sent, when it is another motion than before."""
+        motion: dict[str, float] = {}
+        if snapshot.state is State.DRY_RUN:
+            motion = {
+                reading.joint.name: math.copysign(reading.goal_speed, reading.goal - reading.angle)
+                for reading in snapshot.readings
+                if abs(reading.goal - reading.angle) > _MOVING_RAD
+            }
+        rounded = {name: round(speed, 1) for name, speed in motion.items()}
+        if rounded == self._rehearsed:
+            return
+        self._rehearsed = rounded
+        text = ", ".join(f"{name} {speed:+.3f} rad/s" for name, speed in motion.items())
+        self.get_logger().info(f"dry run, not sent: {text or 'rest'}")
+
     # Services.
 
     def _set_torque(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
-        done = "torque is on, holding" if request.data else "torque is off"
-        return self._answer(response, lambda: self._loop.set_torque(request.data), done)
+        return self._answer(response, lambda: self._loop.set_torque(request.data))
 
     def _recover(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        return self._answer(response, self._loop.recover, "all servos answer")
+        return self._answer(response, self._loop.recover)
 
     def _emergency_stop(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        return self._answer(response, self._loop.emergency_stop, "holding until reset")
+        def stop() -> str:
+            self._loop.emergency_stop()
+            self._tell_emergency()
+            return "holding until reset"
+
+        return self._answer(response, stop)
 
     def _reset_emergency_stop(
         self, _: Trigger.Request, response: Trigger.Response
     ) -> Trigger.Response:
-        done = "commands are taken again, from a zero command on"
-        return self._answer(response, self._loop.reset_emergency_stop, done)
+        def reset() -> str:
+            self._loop.reset_emergency_stop()
+            self._tell_emergency()
+            return "commands are taken again, from a zero command on"
 
-    def _answer(self, response, action, done: str):  # type: ignore[no-untyped-def]
+        return self._answer(response, reset)
+
+    def _tell_emergency(self) -> None:
+        self._emergency_active.publish(Bool(data=self._loop.emergency))
+
+    def _answer(self, response, action: Callable[[], str]):  # type: ignore[no-untyped-def]
         try:
-            action()
+            done = action()
         except SnakeError as error:
             response.success, response.message = False, str(error)
             self.get_logger().error(str(error))

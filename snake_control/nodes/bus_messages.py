@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Sequence
 
@@ -16,12 +17,28 @@ from snake_control.ax12.units import error_names
 from snake_control.nodes.bus_snapshot import Snapshot, State
 
 _NS = 1_000_000_000
+_UNKNOWN = "no reading yet"
 
 _STATE_LEVELS = {
     State.STOPPED: Level.ERROR,
     State.EMERGENCY_STOP: Level.WARN,
     State.TORQUE_OFF: Level.WARN,
+    State.LOWERING: Level.WARN,
+    State.DRY_RUN: Level.WARN,
 }
+
+
+@dataclasses.dataclass(frozen=True)
+class Health:
+    """Judgement of all servos, made now and then.
+
+    Attributes:
+        verdicts: by joint; none before the first look.
+        expected_torques: what gravity asks of each joint [N m].
+    """
+
+    verdicts: tuple[Verdict, ...] = ()
+    expected_torques: tuple[float, ...] = ()
 
 
 class StateMessages:
@@ -33,7 +50,16 @@ class StateMessages:
         self._joint_state.effort = [math.nan] * len(joint_names)
         self._bus_state = BusState(
             servos=[
-                ServoState(joint=name, id=servo_id, age=math.inf)
+                ServoState(
+                    joint=name,
+                    id=servo_id,
+                    age=math.inf,
+                    goal_position=math.nan,
+                    goal_speed=math.nan,
+                    expected_torque=math.nan,
+                    level=int(Level.STALE),
+                    text=_UNKNOWN,
+                )
                 for name, servo_id in zip(joint_names, servo_ids, strict=True)
             ]
         )
@@ -46,7 +72,7 @@ class StateMessages:
         message.velocity = [reading.rate for reading in snapshot.readings]
         return message
 
-    def bus_state(self, snapshot: Snapshot, stamp: Time) -> BusState:
+    def bus_state(self, snapshot: Snapshot, health: Health, stamp: Time) -> BusState:
         """Return the whole state; without a port the servos keep what was last known of them."""
         message = self._bus_state
         message.header.stamp = stamp
@@ -57,12 +83,21 @@ class StateMessages:
         message.command_age = snapshot.command_age
         message.cycles = snapshot.cycles
         message.late_cycles = snapshot.late_cycles
+        message.communication_error_rate = snapshot.error_rate
+        message.reconnections = snapshot.reconnections
+        message.emergency_stop = snapshot.emergency
         for servo, reading in zip(message.servos, snapshot.readings, strict=False):
             _fill(servo, reading)
+        for servo, verdict, torque in zip(
+            message.servos, health.verdicts, health.expected_torques, strict=False
+        ):
+            servo.level, servo.text = int(verdict.level), verdict.text
+            servo.expected_torque = torque
         if not snapshot.readings:
             for servo in message.servos:
                 servo.online = False
                 servo.age = math.inf
+                servo.level, servo.text = int(Level.STALE), _UNKNOWN
         return message
 
 
@@ -81,6 +116,10 @@ def _fill(servo: ServoState, reading: JointReading) -> None:
     servo.misses = reading.counters.misses
     servo.corrupt_replies = reading.counters.corrupt_replies
     servo.invalid_values = reading.invalid_values
+    servo.communication_error_rate = reading.error_rate
+    servo.shut_down = reading.shut_down
+    servo.goal_position = reading.goal
+    servo.goal_speed = reading.goal_speed
 
 
 def time_message(ns: int) -> Time:
@@ -97,9 +136,7 @@ def no_diagnostics(port: str, stamp: Time) -> DiagnosticArray:
     return array
 
 
-def diagnostics(
-    snapshot: Snapshot, verdicts: Sequence[Verdict], port: str, stamp: Time
-) -> DiagnosticArray:
+def diagnostics(snapshot: Snapshot, health: Health, port: str, stamp: Time) -> DiagnosticArray:
     """Return one status of the bus and one of each servo."""
     array = DiagnosticArray()
     array.header.stamp = stamp
@@ -116,10 +153,15 @@ def diagnostics(
                 "cycle time [ms]": f"{1e3 * snapshot.cycle_time:.2f}",
                 "cycles": str(snapshot.cycles),
                 "late cycles": str(snapshot.late_cycles),
+                "communication error rate [%]": f"{100 * snapshot.error_rate:.2f}",
+                "reconnections": str(snapshot.reconnections),
+                "emergency stop": "latched" if snapshot.emergency else "no",
             },
         )
     ]
-    for reading, verdict in zip(snapshot.readings, verdicts, strict=True):
+    for reading, verdict, torque in zip(
+        snapshot.readings, health.verdicts, health.expected_torques, strict=False
+    ):
         counters = reading.counters
         array.status.append(
             _status(
@@ -130,9 +172,13 @@ def diagnostics(
                 {
                     "angle [rad]": f"{reading.angle:.3f}",
                     "load": f"{reading.load:.2f}",
+                    "expected static torque [N m]": f"{torque:.2f}",
                     "voltage [V]": f"{reading.voltage:.1f}",
                     "temperature [degC]": f"{reading.temperature:.0f}",
+                    "age [s]": f"{reading.age:.3f}",
+                    "torque": _torque(reading),
                     "errors": ", ".join(error_names(reading.error_bits)) or "none",
+                    "communication error rate [%]": f"{100 * reading.error_rate:.2f}",
                     "replies": str(counters.replies),
                     "retries": str(counters.retries),
                     "misses": str(counters.misses),
@@ -142,6 +188,12 @@ def diagnostics(
             )
         )
     return array
+
+
+def _torque(reading: JointReading) -> str:
+    if reading.shut_down:
+        return "held back after an alarm"
+    return "on" if reading.torque_on else "off"
 
 
 def _status(

@@ -17,25 +17,25 @@ class Requests:
     """Queue of actions whose callers wait for the outcome."""
 
     def __init__(self) -> None:
-        self._waiting: queue.SimpleQueue[tuple[Callable[[], None], Future[None]]] = (
+        self._waiting: queue.SimpleQueue[tuple[Callable[[], str], Future[str]]] = (
             queue.SimpleQueue()
         )
         self._ended = False
 
-    def carry_out(self, action: Callable[[], None], timeout: float) -> None:
-        """Let the other thread carry out ``action``; return when it has.
+    def carry_out(self, action: Callable[[], str], timeout: float) -> str:
+        """Let the other thread carry out ``action``; return what it says that it did.
 
         Raises:
             RefusedError: not within ``timeout`` seconds (it is then not begun any more), or the
                 other thread has ended.
             SnakeError: what ``action`` raised.
         """
-        future: Future[None] = Future()
+        future: Future[str] = Future()
         self._waiting.put((action, future))
         if self._ended:
             self.end()
         try:
-            future.result(timeout)
+            return future.result(timeout)
         except TimeoutError as error:
             begun = not future.cancel()
             raise RefusedError(
@@ -51,11 +51,11 @@ class Requests:
                 continue
             served = True
             try:
-                action()
+                done = action()
             except SnakeError as error:
                 future.set_exception(error)
             else:
-                future.set_result(None)
+                future.set_result(done)
             finally:
                 if not future.done():
                     future.set_exception(RefusedError("the bus thread failed"))

@@ -17,6 +17,8 @@ class State(enum.IntEnum):
     TORQUE_OFF = 3
     STOPPED = 4
     EMERGENCY_STOP = 5
+    LOWERING = 6
+    DRY_RUN = 7
 
 
 @dataclasses.dataclass(frozen=True)
@@ -32,6 +34,9 @@ class Snapshot:
         cycle_rate: measured [Hz].
         command_age: [s], infinite without a command.
         cycles, late_cycles: since activation.
+        error_rate: share of the last requests without a good reply at the first try.
+        reconnections: how often the port was opened anew since the driver was configured.
+        emergency: whether an emergency stop is latched.
     """
 
     state: State
@@ -44,3 +49,6 @@ class Snapshot:
     command_age: float
     cycles: int
     late_cycles: int
+    error_rate: float
+    reconnections: int
+    emergency: bool

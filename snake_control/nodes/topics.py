@@ -28,6 +28,7 @@ from snake_interfaces.msg import (
     PoseStatus,
 )
 from snake_interfaces.srv import InjectFault
+from std_msgs.msg import Bool
 from std_srvs.srv import SetBool, Trigger
 from visualization_msgs.msg import MarkerArray
 
@@ -76,6 +77,7 @@ _LATCHED = _reliable(1, DurabilityPolicy.TRANSIENT_LOCAL)
 JOINT_VELOCITY_COMMAND = Topic("joint_velocity_command", JointVelocityCommand, _COMMAND)
 JOINT_STATES = Topic("joint_states", JointState, _STATE)
 BUS_STATE = Topic("bus_state", BusState, _STATE)
+EMERGENCY_STOP_ACTIVE = Topic("~/emergency_stop_active", Bool, _LATCHED)
 # Absolute by ROS convention: one aggregator serves the whole graph.
 DIAGNOSTICS = Topic("/diagnostics", DiagnosticArray, _STATE)
 

@@ -184,7 +184,7 @@ def test_torque_off_and_on_does_not_jump(tmp_path: Path) -> None:
         assert robot.call(topics.SET_TORQUE, data=False).success
         state = robot.wait_for_state(BusState.STATE_TORQUE_OFF)
         assert not any(servo.torque_enabled for servo in state.servos)
-        robot.command(joint_7=0.5)
+        robot.ask(joint_7=0.5)
         robot.let_pass(0.5)
         assert robot.bus_state.last.state == BusState.STATE_TORQUE_OFF
         robot.fall_silent()
@@ -230,7 +230,17 @@ def test_diagnostics_have_one_status_of_the_bus_and_one_of_each_servo(robot: Dri
     robot.graph.wait_for(lambda: len(robot.diagnostics.messages) > 1, 10.0, "/diagnostics")
     statuses = robot.diagnostics.last.status
     assert [s.name for s in statuses] == ["bus_driver: bus", *(f"bus_driver: {n}" for n in NAMES)]
-    assert all(s.level == DiagnosticStatus.OK for s in statuses), statuses
+    # Joint 5 carries the raised head.
+    carries = [s for s in statuses if s.name == "bus_driver: joint_5"]
+    assert [s.level for s in carries] == [DiagnosticStatus.WARN]
+    assert "should carry 0.3 N m for long" in carries[0].message
+    assert all(s.level == DiagnosticStatus.OK for s in statuses if s not in carries), statuses
+    state = robot.bus_state.last
+    assert state.servos[4].expected_torque == pytest.approx(0.4, abs=0.1)
+    assert state.servos[4].text == carries[0].message
+    assert [servo.level for servo in state.servos] == [0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0]
+    assert state.communication_error_rate < 0.1
+    assert not state.emergency_stop
 
 
 def test_recover_on_a_healthy_bus_holds(robot: DrivenRobot) -> None:
@@ -251,9 +261,19 @@ def test_a_lost_port_stops_and_recovers(tmp_path: Path) -> None:
         assert not refused.success
         assert robot.bus_state.last.state == BusState.STATE_STOPPED
         robot.start_mock()
+        # By itself, with the readings; torque and motion have to be asked for.
         robot.graph.wait_for(
-            lambda: robot.call(topics.RECOVER).success, 20.0, "a recovery that succeeds"
+            lambda: "the port works again; needs ~/recover" in robot.bus_state.last.text,
+            20.0,
+            "the port's return",
         )
+        state = robot.bus_state.last
+        assert (state.state, state.reconnections) == (BusState.STATE_STOPPED, 1)
+        assert all(servo.online and not servo.torque_enabled for servo in state.servos)
+        robot.joint_states.clear()
+        robot.graph.wait_for(lambda: robot.joint_states.messages, 10.0, "joint_states")
+        answer = robot.call(topics.RECOVER)
+        assert answer.success, answer.message
         robot.wait_for_state(BusState.STATE_HOLDING)
         robot.command()
         robot.wait_for_state(BusState.STATE_MOVING)
@@ -284,7 +304,7 @@ def test_a_driver_whose_clock_does_not_run_publishes_and_says_why_it_holds(
 ) -> None:
     with DrivenRobot(tmp_path, driver={"use_sim_time": True}) as robot:
         robot.wait_for_state(BusState.STATE_HOLDING)
-        robot.command(joint_7=0.2)
+        robot.ask(joint_7=0.2)
         robot.graph.wait_for(
             lambda: "ahead: are the clocks in step?" in robot.bus_state.last.text,
             10.0,

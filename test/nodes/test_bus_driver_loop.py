@@ -64,6 +64,11 @@ class Driver:
 
         wait_for(reached, 10.0, f"{state.name} {text}")
 
+    def move(self) -> None:
+        """Command motion as somebody who has just begun to: with a zero before."""
+        self.drive(State.MOVING, velocities=(0.0,) * 11)
+        self.drive(State.MOVING)
+
     def torque(self) -> set[int]:
         """Ids of the servos with torque."""
         return {i for i, memory in self.servos.memory.items() if memory[TORQUE_ENABLE]}
@@ -158,10 +163,16 @@ def test_torque_that_is_on_already_is_told(servos: ScriptedServos) -> None:
         assert driver.torque() == set()
 
 
+def test_who_was_commanding_already_at_the_start_is_not_obeyed(servos: ScriptedServos) -> None:
+    with driving(servos) as driver:
+        driver.drive(State.HOLDING, "holding: waiting for a zero command")
+        driver.move()
+
+
 @pytest.mark.parametrize("stop", ["recover", "torque", "emergency stop"])
 def test_after_a_stop_motion_waits_for_a_zero_command(servos: ScriptedServos, stop: str) -> None:
     with driving(servos) as driver:
-        driver.drive(State.MOVING)
+        driver.move()
         if stop == "recover":
             driver.loop.recover()
         elif stop == "torque":
@@ -180,7 +191,7 @@ def test_a_state_that_cannot_be_published_does_not_stop_the_cycle(servos: Script
 
     with driving(servos) as driver:
         driver.on_publish = fail
-        driver.drive(State.MOVING)
+        driver.move()
         driver.loop.check()
         assert driver.errors == ["the state cannot be published: RuntimeError('no publisher')"]
 
@@ -198,7 +209,7 @@ def test_a_thread_that_fails_lets_the_joints_hold_and_is_noticed(servos: Scripte
         return False
 
     with driving(servos) as driver:
-        driver.drive(State.MOVING)
+        driver.move()
         driver.on_publish = fail
         wait_for(ended, 10.0, "the end of the thread")
         begin = time.monotonic()

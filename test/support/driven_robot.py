@@ -8,6 +8,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from snake_interfaces.msg import BusState
+
 from snake_control.nodes import topics
 from support.graph import CONFIG, Graph
 from support.process import Process
@@ -51,6 +53,7 @@ class DrivenRobot:
         )
         self._with_mock = with_mock
         self._velocities: tuple[float, ...] | None = None
+        self._obeyed = False
         self._lock = threading.Lock()
 
     def __enter__(self) -> DrivenRobot:
@@ -80,6 +83,7 @@ class DrivenRobot:
 
     def start_driver(self) -> Process:
         """Start a driver."""
+        self._obeyed = False
         return self._start("bus_driver")
 
     def wait_for_state(self, state: int, timeout_s: float = 30.0) -> Any:
@@ -92,14 +96,27 @@ class DrivenRobot:
         return self.graph.wait_for(found, timeout_s, f"bus state {state}")
 
     def command(self, **velocities: float) -> None:
-        """Publish these velocities at 50 Hz from now on, 0 for the other joints."""
+        """Publish these velocities at 50 Hz from now on, 0 for the other joints.
+
+        A driver that has just been started wants to see a zero command first.
+        """
+        if not self._obeyed:
+            self._set((0.0,) * len(NAMES))
+            self.wait_for_state(BusState.STATE_MOVING)
+            self._obeyed = True
+        self.ask(**velocities)
+
+    def ask(self, **velocities: float) -> None:
+        """Do as ``command``, but without the zero before: the driver may well refuse."""
+        self._set(tuple(velocities.get(name, 0.0) for name in NAMES))
+
+    def _set(self, velocities: tuple[float, ...] | None) -> None:
         with self._lock:
-            self._velocities = tuple(velocities.get(name, 0.0) for name in NAMES)
+            self._velocities = velocities
 
     def fall_silent(self) -> None:
         """Publish no command any more."""
-        with self._lock:
-            self._velocities = None
+        self._set(None)
 
     def let_pass(self, seconds: float) -> None:
         """Wait until the mock's robot is this much older."""
