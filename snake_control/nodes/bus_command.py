@@ -97,4 +97,4 @@ class CommandBuffer:
     def age(self, now: float) -> float:
         """Return the command's age [s], infinite without one."""
         command = self._command
-        return math.inf if command is None else now - command.computed_at
+        return math.inf if command is None else max(0.0, now - command.computed_at)

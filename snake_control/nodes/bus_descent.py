@@ -28,7 +28,7 @@ class Descent:
         ]
         self._lowering = Lowering(pose, driver.lowering_speed_rad_s, now)
         self.phase = Phase.MOVING
-        self.text = "lowering"
+        self.text = "lowering before torque goes off"
 
     def step(self, readings: Sequence[JointReading], now: float) -> tuple[float, ...]:
         """Return the velocities of this cycle [rad/s]."""

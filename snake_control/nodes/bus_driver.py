@@ -16,7 +16,7 @@ from collections.abc import Callable
 from typing import Any
 
 from rclpy.clock import Clock, ClockType
-from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 from snake_interfaces.msg import JointVelocityCommand
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool, Trigger
@@ -36,6 +36,7 @@ from snake_control.nodes.bus_messages import (
     time_message,
 )
 from snake_control.nodes.bus_snapshot import Snapshot, State
+from snake_control.nodes.managed import ManagedNode
 from snake_control.nodes.parameters import NodeParameters
 from snake_control.nodes.process import run
 
@@ -48,7 +49,7 @@ _NS = 1_000_000_000
 _MOVING_RAD = 0.02
 
 
-class BusDriver(LifecycleNode):
+class BusDriver(ManagedNode):
     """The driver as a lifecycle node."""
 
     def __init__(self, **overrides: Any) -> None:

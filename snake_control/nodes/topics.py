@@ -41,6 +41,10 @@ class Topic:
     type: type
     qos: QoSProfile
 
+    def of(self, node: str) -> Topic:
+        """Return a topic of a node's own, ``~/x``, as others name it."""
+        return dataclasses.replace(self, name=self.name.replace("~", node, 1))
+
     @property
     def newest_only(self) -> QoSProfile:
         """QoS of a subscriber that is late: it takes the newest message, and no old ones first."""

@@ -16,8 +16,6 @@ pytest.importorskip("rclpy")
 pytest.importorskip("snake_interfaces")
 
 from diagnostic_msgs.msg import DiagnosticStatus
-from lifecycle_msgs.msg import State, Transition
-from lifecycle_msgs.srv import ChangeState, GetState
 from snake_interfaces.msg import BusState
 
 from snake_control.nodes import topics
@@ -392,32 +390,3 @@ def test_one_joint_in_wheel_mode(tmp_path: Path) -> None:
         begin = robot.truth.last
         robot.let_pass(0.5)
         assert abs(joint(robot.truth.last, "joint_11") - joint(begin, "joint_11")) <= 2 * TICK
-
-
-def test_the_lifecycle_without_autostart(tmp_path: Path) -> None:
-    change = topics.Service("~/change_state", ChangeState)
-    get = topics.Service("~/get_state", GetState)
-
-    def transition(robot: DrivenRobot, number: int) -> bool:
-        request = ChangeState.Request(transition=Transition(id=number))
-        return robot.graph.call("bus_driver", change, request).success
-
-    with DrivenRobot(tmp_path, driver={"autostart": False}) as robot:
-        assert robot.call(get).current_state.id == State.PRIMARY_STATE_UNCONFIGURED
-        assert transition(robot, Transition.TRANSITION_CONFIGURE)
-        state = robot.wait_for_state(BusState.STATE_INACTIVE)
-        assert not any(servo.torque_enabled for servo in state.servos)
-        robot.graph.wait_for(lambda: robot.joint_states.last, 5.0, "joint states without torque")
-        assert transition(robot, Transition.TRANSITION_ACTIVATE)
-        robot.wait_for_state(BusState.STATE_HOLDING)
-        assert transition(robot, Transition.TRANSITION_DEACTIVATE)
-        state = robot.wait_for_state(BusState.STATE_INACTIVE)
-        assert all(servo.torque_enabled for servo in state.servos)
-        assert transition(robot, Transition.TRANSITION_CLEANUP)
-        robot.diagnostics.clear()
-        last = robot.graph.wait_for(lambda: robot.diagnostics.last, 5.0, "/diagnostics")
-        assert [status.level for status in last.status] == [DiagnosticStatus.STALE]
-        assert not robot.call(topics.RECOVER).success
-        assert transition(robot, Transition.TRANSITION_CONFIGURE)
-        assert transition(robot, Transition.TRANSITION_ACTIVATE)
-        robot.wait_for_state(BusState.STATE_HOLDING)

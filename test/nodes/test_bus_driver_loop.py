@@ -228,3 +228,57 @@ def test_a_request_that_timed_out_is_not_carried_out_later() -> None:
         requests.carry_out(lambda: done.append(1), 0.05)
     assert not requests.serve()
     assert done == []
+
+
+def test_a_lowering_that_gets_nowhere_is_given_up_and_torque_stays_on(
+    servos: ScriptedServos,
+) -> None:
+    # Scripted servos stay where they are; that is to be found by the lowering itself.
+    lowering = {"lower_before_torque_off": True, "lowering_angles_rad": (0.5,) + (0.0,) * 10}
+    with driving(servos, follow_timeout_s=60.0, **lowering) as driver:
+        assert driver.loop.set_torque(False).startswith("lowering")
+        driver.wait_for_state(State.LOWERING, "joint_1 (servo id 1) is 0.50 rad away")
+        snapshot = driver.wait_for_state(State.HOLDING, "lowering given up")
+        assert driver.torque() == set(IDS)
+        assert "torque stays on: joint_1" in snapshot.text
+        driver.drive(State.HOLDING, "waiting for a zero command")
+        assert driver.errors[-1].startswith("lowering given up")
+
+
+def test_a_fault_ends_a_lowering_and_torque_stays_on(servos: ScriptedServos) -> None:
+    lowering = {"lower_before_torque_off": True, "lowering_angles_rad": (0.5,) + (0.0,) * 10}
+    with driving(servos, **lowering) as driver:
+        driver.loop.set_torque(False)
+        driver.wait_for_state(State.LOWERING)
+        servos.error_bits[5] = 32
+        driver.wait_for_state(State.STOPPED, "joint_5 (servo id 5) shut down: overload")
+        assert driver.torque() == set(IDS)
+        # At once then, and it says that nothing was lowered.
+        assert "the robot was not lowered: joint_5" in driver.loop.set_torque(False)
+        assert driver.torque() == set()
+
+
+def test_at_the_end_the_robot_is_lowered_too(servos: ScriptedServos) -> None:
+    there = {"lower_before_torque_off": True, "lowering_angles_rad": (0.0,) * 11}
+    there |= {"follow_timeout_s": 60.0}
+    with driving(servos, torque_off_on_exit=True, **there) as driver:
+        driver.wait_for_state(State.HOLDING)
+    assert driver.torque() == set()
+    far = there | {"lowering_angles_rad": (0.5,) + (0.0,) * 10}
+    with driving(servos, torque_off_on_exit=True, **far) as driver:
+        driver.wait_for_state(State.HOLDING)
+    assert driver.torque() == set(IDS), "better held than dropped"
+    assert driver.errors[-1].startswith("lowering given up")
+
+
+def test_a_port_that_is_lost_is_opened_again_with_growing_pauses(servos: ScriptedServos) -> None:
+    with driving(servos, reconnect_first_s=0.05, reconnect_longest_s=0.2) as driver:
+        driver.wait_for_state(State.HOLDING)
+        servos.unplug()
+        driver.wait_for_state(State.STOPPED, "no such port")
+        tries = [text for text in driver.warnings if "the port is not back yet" in text]
+        assert len(tries) == 1, "the same reason is told once"
+        driver.loop.emergency_stop()
+        driver.wait_for_state(State.EMERGENCY_STOP)
+        assert driver.last is not None
+        assert driver.last.readings == ()
