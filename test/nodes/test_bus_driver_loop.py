@@ -238,10 +238,9 @@ def test_a_lowering_that_gets_nowhere_is_given_up_and_torque_stays_on(
     with driving(servos, follow_timeout_s=60.0, **lowering) as driver:
         assert driver.loop.set_torque(False).startswith("lowering")
         driver.wait_for_state(State.LOWERING, "joint_1 (servo id 1) is 0.50 rad away")
-        snapshot = driver.wait_for_state(State.HOLDING, "lowering given up")
+        # Who goes on commanding all the time gets nothing of it afterwards either.
+        driver.drive(State.HOLDING, "waiting for a zero command; lowering given up, torque stays")
         assert driver.torque() == set(IDS)
-        assert "torque stays on: joint_1" in snapshot.text
-        driver.drive(State.HOLDING, "waiting for a zero command")
         assert driver.errors[-1].startswith("lowering given up")
 
 
