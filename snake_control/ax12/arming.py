@@ -7,11 +7,13 @@ defaults. So everything that matters is written each time, and read back, before
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
 from snake_control.ax12 import control_table as ct
 from snake_control.ax12.bus import Bus
+from snake_control.ax12.compliance import Compliance
 from snake_control.ax12.eeprom import ServoInfo
 from snake_control.ax12.joint import WHEEL_MODE, JointSetup
 from snake_control.ax12.units import MAX_TICKS, decode_signed, ticks_to_rad
@@ -160,7 +162,7 @@ def _seed(bus: Bus, joint: JointSetup, servo: ServoInfo) -> Seed:
         # Else its torque would return with the torque limit, before the others are ready.
         bus.write_verified(joint.servo_id, ct.TORQUE_ENABLE.address, b"\x00")
     held = enabled and not limp
-    torque_limit = min(joint.torque_limit_raw, servo.max_torque_raw)
+    torque_limit = _torque_limit(joint, servo)
     if joint.mode == WHEEL_MODE:
         goal = 0
         motion = ct.MOVING_SPEED.encode(0) + ct.TORQUE_LIMIT.encode(torque_limit)
@@ -183,9 +185,10 @@ def _goal_to_hold(joint: JointSetup, servo: ServoInfo, ram: bytes, held: bool) -
         raise ServoError([f"reports position {position}, which does not exist"])
     goal = ct.GOAL_POSITION.decode(ram, _RAM)
     at_rest = decode_signed(ct.PRESENT_SPEED.decode(ram, _RAM)) == 0
-    if held and at_rest and abs(goal - position) <= joint.compliance_ticks:
-        # It holds already, a droop away from its goal; goal = position would let it sag once more.
-        position = goal
+    if held and at_rest:
+        kept = _goal_that_holds(joint, servo, ram, position, goal)
+        if kept is not None:
+            return kept
     if not servo.goal_allowed(position):
         raise ServoError(
             [
@@ -194,6 +197,36 @@ def _goal_to_hold(joint: JointSetup, servo: ServoInfo, ram: bytes, held: bool) -
             ]
         )
     return position
+
+
+def _goal_that_holds(
+    joint: JointSetup, servo: ServoInfo, ram: bytes, position: int, goal: int
+) -> int | None:
+    """Return the goal with which a servo that holds goes on as it does, by the settings to come.
+
+    It rests a droop away from its goal; with goal = position it would let go of that, and sag.
+    ``None`` if where it rests does not tell its load, or that goal is not allowed.
+    """
+    found = Compliance.found(ram, _RAM, goal > position)
+    wanted = Compliance.configured(joint, _torque_limit(joint, servo))
+    distance: float = abs(goal - position)
+    if found != wanted:
+        output = found.output_at(distance)
+        if math.isnan(output):
+            return None
+        distance = (
+            min(distance, wanted.distance_at(output))
+            if output == 0
+            else (wanted.distance_at(output))
+        )
+    elif distance > wanted.margin_ticks + wanted.slope_ticks:
+        return None
+    kept = position + round(math.copysign(distance, goal - position))
+    return kept if servo.goal_allowed(kept) else None
+
+
+def _torque_limit(joint: JointSetup, servo: ServoInfo) -> int:
+    return min(joint.torque_limit_raw, servo.max_torque_raw)
 
 
 def _compliance(joint: JointSetup) -> bytes:

@@ -185,6 +185,9 @@ def test_a_servo_that_holds_already_keeps_its_goal(bus: Bus, servos: ScriptedSer
     """A restarted driver must not let a loaded joint sag by its droop once more."""
     servos.memory[1][39] = 4  # clockwise, at speed 0
     for servo_id in (1, 2):
+        servos.memory[servo_id][26:30] = bytes((2, 2, 16, 16))
+        servos.memory[servo_id][34:36] = (512).to_bytes(2, "little")
+        servos.memory[servo_id][48:50] = (40).to_bytes(2, "little")
         servos.memory[servo_id][24] = 1
         servos.memory[servo_id][30:32] = (520).to_bytes(2, "little")
     servos.memory[2][38] = 5  # moving: its goal is a look-ahead of a driver that died
