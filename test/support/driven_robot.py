@@ -32,13 +32,14 @@ class DrivenRobot:
         driver: Mapping[str, Any] | None = None,
         mock: Mapping[str, Any] | None = None,
         with_mock: bool = True,
+        with_driver: bool = True,
     ) -> None:
         """Prepare.
 
         Args:
             directory: for the port's link and the parameter file.
             driver, mock: parameters of the two nodes.
-            with_mock: whether there is a mock from the start.
+            with_mock, with_driver: whether there are a mock and a driver from the start.
         """
         port = str(directory / "port")
         self.port = Path(port)
@@ -52,6 +53,7 @@ class DrivenRobot:
             )
         )
         self._with_mock = with_mock
+        self._with_driver = with_driver
         self._velocities: tuple[float, ...] | None = None
         self._obeyed = False
         self._lock = threading.Lock()
@@ -67,7 +69,8 @@ class DrivenRobot:
             self.graph.node.create_timer(0.02, self._publish)
             if self._with_mock:
                 self.start_mock()
-            self.driver = self.start_driver()
+            if self._with_driver:
+                self.driver = self.start_driver()
         except BaseException:
             self.graph.__exit__(None, None, None)
             raise

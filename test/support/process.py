@@ -55,6 +55,10 @@ class Process:
         """Whether it ended with an error, and not by a signal of the test."""
         return bool(self.exit_code) and not self._signalled
 
+    def let_end(self) -> None:
+        """Do not count its end as a crash, whatever its exit code: it is expected to give up."""
+        self._signalled = True
+
     def output(self) -> str:
         """Everything it printed so far."""
         return self._log.read_text(encoding="utf-8", errors="replace")

@@ -1,0 +1,223 @@
+"""Judges one scenario from what was recorded; pure functions, no clock, no ROS."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import re
+from collections.abc import Sequence
+
+import numpy as np
+from faults.scenario import Expect, Scenario
+from numpy.typing import NDArray
+
+from snake_control.ax12.chain import FEEDBACK_LOST_S
+from snake_control.config import Config
+
+Array = NDArray[np.float64]
+
+TICK = math.radians(300.0 / 1023.0)
+AT_REST_RAD_S = 0.03
+ACCELERATION_RAD_S2 = 60.0
+OVERLOAD_S = 2.0
+
+MEASURED_WITHIN_S = 0.06
+"""Ground truth comes every 20 ms, from a body that moves in steps of 10 ms; the fault begins
+between two of them, and the clocks of three processes meet here."""
+
+_MOVING, _STOPPED, _EMERGENCY = 2, 4, 5
+
+
+@dataclasses.dataclass(frozen=True)
+class Record:
+    """What was seen of a scenario; times on one clock [s].
+
+    Attributes:
+        fault_at: when the fault was in force.
+        until: end of the time in which it was watched.
+        time, phi, phi_dot: ground truth, (k,), (k, joints), (k, joints).
+        states: time, state and all texts of each bus_state.
+        speed: largest commanded speed before the fault, of each joint [rad/s].
+        died: processes that ended though nobody ended them.
+    """
+
+    fault_at: float
+    until: float
+    time: Array
+    phi: Array
+    phi_dot: Array
+    states: Sequence[tuple[float, int, str]]
+    speed: Array
+    died: Sequence[str] = ()
+
+
+@dataclasses.dataclass
+class Outcome:
+    """What came out.
+
+    Attributes:
+        did: what the driver said.
+        stop_s: from the fault to rest; NaN if the robot did not stop.
+        travel: largest travel of a joint that is under torque, from the fault (faulty joints) or
+            from the stop (the others) on [rad].
+        recovered: what brought motion back; empty if nothing had to, "no" if nothing did.
+        violations: what must not be.
+    """
+
+    did: str = ""
+    stop_s: float = math.nan
+    travel: float = math.nan
+    recovered: str = ""
+    violations: list[str] = dataclasses.field(default_factory=list)
+
+
+def timeouts(config: Config) -> dict[str, float]:
+    """Return the time-outs that scenarios name [s]."""
+    driver, controller = config.bus_driver, config.scp_controller
+    period = 1.0 / driver.rate_hz
+    joints = len(config.servos.ids)
+    return {
+        "none": 0.0,
+        "command": driver.command_timeout_s,
+        # Believed last just before the fault, in the cycle after the time-out found missing.
+        "feedback": FEEDBACK_LOST_S + 2 * period,
+        # Two replies in a row with the alarm.
+        "alarm": 2 * period,
+        "overload": OVERLOAD_S + 2 * period,
+        # One servo's settings every 0.1 s.
+        "settings": 0.1 * (joints + 1),
+        "settings_of_all": 0.1 + period,
+        # A window under way may hold motion from before the fault.
+        "follow": 2 * driver.follow_timeout_s + period,
+        "head": controller.head_timeout_s + driver.command_timeout_s,
+        "reference": controller.reference_timeout_s + driver.command_timeout_s,
+    }
+
+
+def look_ahead_bound(config: Config, speed: Array) -> Array:
+    """Return how far each joint may run when no command reaches it any more [rad]."""
+    servos, driver = config.servos, config.bus_driver
+    compliance = np.array(servos.compliance_margin_ticks) + np.array(servos.compliance_slope)
+    # Moving Speed is whole units: a fraction of one is dithered to the next above.
+    unit = 0.111 * math.tau / 60.0
+    late = 1.0 / driver.rate_hz + MEASURED_WITHIN_S
+    return (compliance + 3) * TICK + (speed + unit) * (driver.look_ahead_s + late)
+
+
+def judge(scenario: Scenario, record: Record, config: Config) -> Outcome:
+    """Return the outcome with every criterion that does not hold."""
+    outcome = Outcome()
+    wrong = outcome.violations
+    wrong += [f"{name} died" for name in record.died]
+    _check_ranges(scenario, record, config, wrong)
+    after = [(t, state, text) for t, state, text in record.states if t >= record.fault_at]
+    if scenario.reported:
+        said = next((text for _, _, text in after if re.search(scenario.reported, text)), None)
+        if said is None:
+            wrong.append(f"not reported: nothing like {scenario.reported!r}")
+    stops = [
+        (t, text)
+        for t, state, text in after
+        if state in (_STOPPED, _EMERGENCY) and t <= record.until
+    ]
+    outcome.did = _did(scenario, after, stops)
+    if scenario.expect is Expect.STOPS and not stops:
+        wrong.append("did not stop")
+    if scenario.expect is Expect.GOES_ON and stops:
+        wrong.append(f"stopped: {stops[0][1]}")
+    _check_rest(scenario, record, config, outcome, bool(stops))
+    _check_travel(scenario, record, config, outcome, stops[0][0] if stops else None)
+    return outcome
+
+
+def _did(
+    scenario: Scenario,
+    after: Sequence[tuple[float, int, str]],
+    stops: Sequence[tuple[float, str]],
+) -> str:
+    if stops:
+        return stops[0][1].split(" | ")[0]
+    if scenario.reported:
+        for _, _, text in after:
+            if re.search(scenario.reported, text):
+                return text
+    states = [text.split(" | ")[0] for _, _, text in after]
+    return states[-1] if states else ""
+
+
+def _check_ranges(scenario: Scenario, record: Record, config: Config, wrong: list[str]) -> None:
+    for i, servo_id in enumerate(config.servos.ids):
+        lower, upper = config.robot.joint_range(i + 1)
+        lowest, highest = record.phi[:, i].min(), record.phi[:, i].max()
+        if servo_id not in scenario.limp and not (lower <= lowest and highest <= upper):
+            wrong.append(f"joint_{i + 1} left its range: {lowest:.3f}..{highest:.3f} rad")
+
+
+def _led(scenario: Scenario, config: Config) -> NDArray[np.bool_]:
+    """Which joints commands still reach."""
+    out = set(scenario.limp) | set(scenario.faulty)
+    if scenario.line_dead:
+        out |= set(config.servos.ids)
+    return np.array([servo_id not in out for servo_id in config.servos.ids])
+
+
+def _check_rest(
+    scenario: Scenario, record: Record, config: Config, outcome: Outcome, stopped: bool
+) -> None:
+    """Whether all joints with torque came to rest, in time where a command can bring that about."""
+    if scenario.expect not in (Expect.STOPS, Expect.ENDS) and not stopped:
+        return
+    limp = np.array([servo_id in scenario.limp for servo_id in config.servos.ids])
+    watched = (record.time >= record.fault_at) & (record.time <= record.until)
+    time = record.time[watched]
+    speed = np.abs(record.phi_dot[watched])
+
+    def rest_at(chosen: NDArray[np.bool_]) -> float:
+        moving = time[(speed[:, chosen] > AT_REST_RAD_S).any(axis=1)] if chosen.any() else time[:0]
+        return float(moving[-1]) - record.fault_at if len(moving) else 0.0
+
+    outcome.stop_s = rest_at(~limp)
+    if len(time) and outcome.stop_s > time[-1] - record.fault_at - 0.1:
+        outcome.violations.append("never came to rest")
+        return
+    led = _led(scenario, config)
+    if scenario.expect is not Expect.STOPS or not led.any():
+        return
+    bound = (
+        timeouts(config)[scenario.timeout]
+        + 2.0 / config.bus_driver.rate_hz
+        + float(record.speed.max()) / ACCELERATION_RAD_S2
+        + MEASURED_WITHIN_S
+    )
+    took = rest_at(led)
+    if took > bound:
+        outcome.violations.append(f"rest after {took:.2f} s, allowed {bound:.2f} s")
+
+
+def _check_travel(
+    scenario: Scenario, record: Record, config: Config, outcome: Outcome, stop_at: float | None
+) -> None:
+    led = _led(scenario, config)
+    limp = np.array([servo_id in scenario.limp for servo_id in config.servos.ids])
+    bound = look_ahead_bound(config, record.speed)
+    largest = 0.0
+    for i in range(len(led)):
+        start = record.fault_at
+        if limp[i]:
+            continue
+        if led[i]:
+            # A joint that commands reach moves as commanded until the robot is stopped.
+            if stop_at is None:
+                continue
+            start = stop_at
+        seen = (record.time >= start) & (record.time <= record.until)
+        if not seen.any():
+            continue
+        phi = record.phi[seen, i]
+        travel = float(np.abs(phi - phi[0]).max())
+        largest = max(largest, travel)
+        if travel > bound[i]:
+            outcome.violations.append(
+                f"joint_{i + 1} went {travel:.3f} rad, allowed {bound[i]:.3f} rad"
+            )
+    outcome.travel = largest
