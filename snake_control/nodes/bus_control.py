@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import Future
 from contextlib import contextmanager
 
 from snake_control.ax12.arming import disarm_confirmed, require_off
@@ -20,9 +21,12 @@ from snake_control.nodes.bus_command import CommandBuffer
 from snake_control.nodes.bus_connection import READ_SHARE
 from snake_control.nodes.bus_decision import Situation, Velocities, decide, named
 from snake_control.nodes.bus_descent import Descent
-from snake_control.nodes.bus_requests import RefusedError
+from snake_control.nodes.bus_requests import NotLoweredError, RefusedError
 from snake_control.nodes.bus_session import Session
 from snake_control.nodes.bus_snapshot import State
+
+HOLD_CYCLES = 5
+"""Cycles of hold before the driver lets go: SYNC_WRITE is not acknowledged."""
 
 
 class BusControl:
@@ -54,20 +58,25 @@ class BusControl:
         self._fault = ""
         self._note = ""
         self._descent: Descent | None = None
+        self._descended: Future[str] | None = None
+        self._hold_left = 0
 
     @property
     def busy(self) -> bool:
         """Whether a lowering is under way."""
         return self._descent is not None
 
-    def start(self) -> None:
-        """Open the port and check all servos.
+    def start(self) -> tuple[float, ...]:
+        """Open the port and check all servos; return their joints' angles [rad].
 
         Raises:
             BusError, ServoError: why not. Nothing was written.
         """
         self.session.start()
         self._fault = self._note = ""
+        chain = self.session.chain
+        assert chain is not None
+        return tuple(reading.angle for reading in chain.readings())
 
     def cycle(self, begin: float) -> tuple[State, str, float]:
         """Do one bus cycle; return state, text, and when reading began [s]."""
@@ -96,7 +105,8 @@ class BusControl:
             BusError: the port failed.
         """
         chain = self.session.chain
-        if not self._active or chain is None or not chain.armed or self._driver.dry_run:
+        led = self._active or self._descent is not None
+        if not led or chain is None or not chain.armed or self._driver.dry_run:
             return False
         begin = time.monotonic()
         chain.write(None)
@@ -119,8 +129,9 @@ class BusControl:
             if obstacle:
                 self._warn(f"the robot is not lowered: {obstacle}")
             else:
-                self._begin_descent()
-                while self._descent is not None:
+                if self._descent is None:
+                    self._begin_descent()
+                while self._descent is not None or self._hold_left:
                     turn()
                 lowered = not self._note
         self._active = False
@@ -129,6 +140,10 @@ class BusControl:
                 self._take_torque()
             except SnakeError as error:
                 self._error(f"torque off at the end: {error}")
+
+    def forsake(self) -> None:
+        """Tell whoever waits for the end of a lowering that nobody goes on with it."""
+        self._abandon_descent("the driver ends")
 
     # Requests; each returns what it did, in words.
 
@@ -171,6 +186,17 @@ class BusControl:
         self._note = ""
         self.commands.wait_for_zero(asked_at, time.monotonic())
         return "torque is on, holding"
+
+    def release(self) -> Future[str]:
+        """Free the joints as ``torque_off`` does; the future tells the end of a lowering, too."""
+        done: Future[str] = Future()
+        # One that is under way already will do.
+        text = self.torque_off() if self._descent is None else ""
+        if self._descent is None:
+            done.set_result(text)
+        else:
+            self._descended = done
+        return done
 
     def torque_off(self) -> str:
         """Free the joints, or begin the lowering after which they are freed."""
@@ -215,6 +241,8 @@ class BusControl:
             self.session.connect()
             chain = self.session.chain
             assert chain is not None
+            if self.emergency:
+                raise RefusedError("emergency stop in the meantime")
             if self._torque_wanted:
                 self._arm(chain)
         except SnakeError as error:
@@ -283,6 +311,7 @@ class BusControl:
             except SnakeError as error:
                 self._note = f"lowered, but torque is not off: {error}"
                 self._error(self._note)
+            self._tell_descent()
 
     def _abandon_descent(self, why: str) -> None:
         if self._descent is not None:
@@ -292,9 +321,20 @@ class BusControl:
         self._descent = None
         self._note = note
         self._error(note)
+        # Also where no command is executed: the last goal of a lowering lies ahead of the joint.
+        self._hold_left = HOLD_CYCLES
+        self._tell_descent()
         # Whoever asked for motion meanwhile must not get it all at once.
         now = time.monotonic()
         self.commands.wait_for_zero(now, now)
+
+    def _tell_descent(self) -> None:
+        if self._descended is not None:
+            waiting, self._descended = self._descended, None
+            if self._note:
+                waiting.set_exception(NotLoweredError(self._note))
+            else:
+                waiting.set_result("torque is off, after a lowering")
 
     # One cycle.
 
@@ -323,6 +363,9 @@ class BusControl:
     def _write(self, chain: ServoChain, velocities: Velocities, now: float) -> None:
         if self._descent is not None:
             velocities = self._descent.step(chain.readings(), now)
+        elif self._hold_left:
+            self._hold_left -= 1
+            velocities = None
         elif not self._active:
             return
         if self._driver.dry_run:
@@ -351,6 +394,8 @@ class BusControl:
     def lose_port(self, error: BusError) -> None:
         """Note that the port failed; it is opened again by itself, torque comes with recovery."""
         self.session.lose(str(error), time.monotonic())
+        self._abandon_descent(str(error))
+        self._hold_left = 0
         if self._active and not self._driver.dry_run:
             self._stop(str(error))
         else:

@@ -35,8 +35,9 @@ from snake_control.nodes.bus_messages import (
     no_diagnostics,
     time_message,
 )
+from snake_control.nodes.bus_requests import NotLoweredError
 from snake_control.nodes.bus_snapshot import Snapshot, State
-from snake_control.nodes.managed import ManagedNode
+from snake_control.nodes.managed import ManagedNode, logged
 from snake_control.nodes.parameters import NodeParameters
 from snake_control.nodes.process import run
 
@@ -91,8 +92,8 @@ class BusDriver(ManagedNode):
         self._tell_emergency()
         command = topics.JOINT_VELOCITY_COMMAND
         self.create_subscription(command.type, command.name, self._take_command, command.qos)
-        self._serve(topics.SET_TORQUE, self._set_torque)
-        self._serve(topics.RECOVER, self._recover)
+        self.serve_slowly(topics.SET_TORQUE, self._set_torque)
+        self.serve_slowly(topics.RECOVER, self._recover)
         self._serve(topics.EMERGENCY_STOP, self._emergency_stop)
         self._serve(topics.RESET_EMERGENCY_STOP, self._reset_emergency_stop)
         # Not by the node's clock: with use_sim_time it may stand still.
@@ -104,19 +105,28 @@ class BusDriver(ManagedNode):
             self._starter = self.create_timer(0.0, self._start_step, clock=steady)
 
     def close(self) -> None:
-        """Hold, switch torque off if configured, close the port."""
-        self._loop.close()
+        """Hold, switch torque off if configured, close the port.
+
+        A lowering before takes its time; an emergency stop ends it.
+        """
+        self.finish(self._loop.close)
 
     # Lifecycle.
 
+    @logged
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Open the port and check all servos."""
-        result = self._attempt(self._loop.open)
-        heavy = self._load.too_much(self._config.robot.start_joint_angles_rad)
-        if result == TransitionCallbackReturn.SUCCESS and heavy:
-            self.get_logger().warning(f"in the start posture {heavy}")
-        return result
+        return self._attempt(self._open)
 
+    def _open(self) -> None:
+        found = self._loop.open()
+        start = self._config.robot.start_joint_angles_rad
+        for posture, angles in (("start posture", start), ("posture found", found)):
+            heavy = self._load.too_much(angles)
+            if heavy:
+                self.get_logger().warning(f"in the {posture} {heavy}")
+
+    @logged
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Seed goals, write RAM settings, switch torque on."""
         result = self._attempt(self._loop.activate)
@@ -124,21 +134,38 @@ class BusDriver(ManagedNode):
             return super().on_activate(state)
         return result
 
+    @logged
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Come to rest; the servos go on holding."""
         self._loop.deactivate()
         return super().on_deactivate(state)
 
+    @logged
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Take the torque, after a lowering if configured, and close the port."""
-        self._loop.close(torque_off=True)
+        """Take the torque, after a lowering if configured, and close the port.
+
+        It fails if the robot could not be lowered: better held than dropped.
+        """
+        log = self.get_logger()
+        try:
+            if not self._config.bus_driver.dry_run:
+                log.info(self._loop.release())
+        except NotLoweredError as error:
+            log.error(f"no cleanup: {error}")
+            return TransitionCallbackReturn.FAILURE
+        except SnakeError as error:
+            # A port that is lost, or a servo that does not answer, must not bar the way out.
+            log.warning(f"cleanup, torque is not known to be off: {error}")
+        self._loop.close(torque_off=False)
         self._last = None
         return TransitionCallbackReturn.SUCCESS
 
+    @logged
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Hold, take the torque if configured, close the port."""
         return self._end()
 
+    @logged
     def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Hold and close the port, whatever went wrong in a transition; configure begins anew."""
         self.get_logger().error(

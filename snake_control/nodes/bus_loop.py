@@ -10,18 +10,16 @@ import math
 import threading
 import time
 from collections.abc import Callable, Sequence
+from concurrent.futures import Future
 
 from snake_control.config import Config
 from snake_control.errors import BusError
-from snake_control.nodes.bus_control import BusControl
+from snake_control.nodes.bus_control import HOLD_CYCLES, BusControl
 from snake_control.nodes.bus_requests import RefusedError, Requests
 from snake_control.nodes.bus_schedule import Schedule
 from snake_control.nodes.bus_snapshot import Snapshot, State
 
 _REQUEST_TIMEOUT_S = 10.0
-
-_HOLD_BURST = 5
-"""Cycles of hold before the driver lets go: SYNC_WRITE is not acknowledged."""
 
 _PUBLISH_FAILURES = (
     ArithmeticError,
@@ -59,6 +57,7 @@ class BusLoop:
         self._requests = Requests()
         self._stopping = False
         self._torque_off_at_end = False
+        self._mistake = ""
         self._thread: threading.Thread | None = None
         self._publish_logged_at = -_LOG_PERIOD_S
 
@@ -69,19 +68,20 @@ class BusLoop:
         """Whether an emergency stop is latched."""
         return self._control.emergency
 
-    def open(self) -> None:
-        """Open the port, check all servos, start the thread.
+    def open(self) -> tuple[float, ...]:
+        """Open the port, check all servos, start the thread; return the joints' angles [rad].
 
         Raises:
             BusError: the port cannot be opened.
             ServoError: everything that is missing or wrong on the bus. Nothing was written.
         """
         self.close()
-        self._control.start()
-        self._stopping = False
+        angles = self._control.start()
+        self._stopping = self._torque_off_at_end = False
         self._requests = Requests()
         self._thread = threading.Thread(target=self._run, name="bus", daemon=True)
         self._thread.start()
+        return angles
 
     def close(self, torque_off: bool | None = None) -> None:
         """Hold, take the torque, stop the thread, close the port.
@@ -100,8 +100,11 @@ class BusLoop:
 
     def check(self) -> None:
         """Raise ``RefusedError`` if the thread ended by itself, which it must not."""
-        if self._thread is not None and not self._thread.is_alive():
-            raise RefusedError("the bus thread ended unexpectedly; its traceback is above")
+        thread = self._thread
+        if thread is not None and not thread.is_alive() and not self._stopping:
+            raise RefusedError(
+                f"the bus thread ended unexpectedly, its traceback is above: {self._mistake}"
+            )
 
     def command(self, velocities: Sequence[float], age: float) -> None:
         """Take joint velocities [rad/s] that were computed ``age`` seconds ago."""
@@ -149,6 +152,22 @@ class BusLoop:
         """
         return self._request(self._control.torque_on if on else self._control.torque_off)
 
+    def release(self) -> str:
+        """Free the joints as ``set_torque(False)`` does; return when a lowering has ended, too.
+
+        Raises:
+            NotLoweredError: the lowering was given up or ended by somebody; torque stays on.
+            RefusedError, BusError, ServoError: as ``set_torque``.
+        """
+        done: list[Future[str]] = []
+
+        def begin() -> str:
+            done.append(self._control.release())
+            return "begun"
+
+        self._request(begin)
+        return done[0].result()
+
     def recover(self) -> str:
         """Open the port anew if it failed, check all servos, forget the fault.
 
@@ -184,11 +203,15 @@ class BusLoop:
                     # The time a request took is no lateness of the cycle.
                     self._schedule.start(time.monotonic())
                 self._turn()
+        except Exception as error:
+            self._mistake = repr(error)
+            raise
         finally:
             try:
                 self._burst_of_hold()
                 self._control.end(self._torque_off_at_end, self._turn)
             finally:
+                self._control.forsake()
                 self._requests.end()
 
     def _turn(self) -> None:
@@ -238,7 +261,7 @@ class BusLoop:
 
     def _burst_of_hold(self) -> None:
         try:
-            for _ in range(_HOLD_BURST):
+            for _ in range(HOLD_CYCLES):
                 begin = time.monotonic()
                 if not self._control.hold_cycle():
                     return

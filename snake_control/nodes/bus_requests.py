@@ -13,6 +13,10 @@ class RefusedError(SnakeError, RuntimeError):
     """A request that does not fit the state of the driver."""
 
 
+class NotLoweredError(RefusedError):
+    """A lowering that did not reach its pose; torque stays on."""
+
+
 class Requests:
     """Queue of actions whose callers wait for the outcome."""
 

@@ -14,9 +14,9 @@ import pytest
 from snake_control.config import load
 from snake_control.errors import ServoError
 from snake_control.nodes.bus_loop import BusLoop
-from snake_control.nodes.bus_requests import RefusedError, Requests
+from snake_control.nodes.bus_requests import NotLoweredError, RefusedError, Requests
 from snake_control.nodes.bus_snapshot import Snapshot, State
-from support.scripted_servos import WRITE, ScriptedServos, packet
+from support.scripted_servos import PING, SYNC_WRITE, WRITE, ScriptedServos, packet
 from support.waiting import wait_for
 
 CONFIG = Path(__file__).resolve().parents[2] / "config" / "paper_robot.yaml"
@@ -142,6 +142,86 @@ def test_recover_does_not_undo_an_emergency_stop(servos: ScriptedServos) -> None
         driver.wait_for_state(State.EMERGENCY_STOP)
 
 
+def test_an_emergency_stop_while_servos_are_checked_keeps_them_without_torque(
+    servos: ScriptedServos,
+) -> None:
+    def stop(instruction: bytes, answer: bytes) -> bytes:
+        if instruction[4] == PING:  # only when servos are checked
+            driver.loop.emergency_stop()
+        return answer
+
+    with driving(servos) as driver:
+        for memory in servos.memory.values():
+            memory[TORQUE_ENABLE] = 0
+        driver.wait_for_state(State.STOPPED, "torque is off")
+        servos.answer = stop
+        with pytest.raises(RefusedError, match="emergency stop in the meantime"):
+            driver.loop.recover()
+        assert driver.torque() == set()
+        servos.answer = None
+        driver.loop.reset_emergency_stop()
+        driver.loop.recover()
+        driver.wait_for_state(State.HOLDING)
+
+
+@contextmanager
+def lowering(servos: ScriptedServos, goal: float, **changes: Any) -> Iterator[Driver]:
+    """An inactive driver that lowers joint 1; scripted servos themselves do not move."""
+    changes = {"follow_timeout_s": 60.0} | changes
+    pose = {"lower_before_torque_off": True, "lowering_angles_rad": (goal,) + (0.0,) * 10}
+    with driving(servos, **pose, **changes) as driver:
+        driver.loop.deactivate()
+        yield driver
+
+
+def test_release_returns_when_torque_is_off_after_a_lowering(servos: ScriptedServos) -> None:
+    def follow(instruction: bytes, answer: bytes) -> bytes:
+        for memory in servos.memory.values():
+            goal, here = (int.from_bytes(memory[a : a + 2], "little") for a in (30, 36))
+            memory[36:38] = (here + max(-1, min(1, goal - here))).to_bytes(2, "little")
+        return answer
+
+    with lowering(servos, 0.3) as driver:
+        servos.answer = follow
+        assert driver.loop.release() == "torque is off, after a lowering"
+        assert driver.torque() == set()
+        angle = (int.from_bytes(servos.memory[1][36:38], "little") - 511.5) * 300 / 1023
+        assert angle == pytest.approx(17.2, abs=2.5)  # degrees
+
+
+def test_release_says_why_torque_stays_on(servos: ScriptedServos) -> None:
+    with lowering(servos, 0.5) as driver:
+        with pytest.raises(NotLoweredError, match=r"joint_1 .* does not get nearer"):
+            driver.loop.release()
+        assert driver.torque() == set(IDS)
+
+
+@pytest.mark.parametrize("end", ["emergency stop", "end of the driver", "loss of the port"])
+def test_a_lowering_that_is_ended_leaves_no_goal_ahead(servos: ScriptedServos, end: str) -> None:
+    with lowering(servos, 0.5) as driver:
+        driver.loop.set_torque(False)
+        driver.wait_for_state(State.LOWERING, "is 0.50 rad away")
+        ahead = servos.memory[1][30:32]
+        if end == "emergency stop":
+            driver.loop.emergency_stop()
+            driver.wait_for_state(State.INACTIVE, "emergency stop is latched")
+        elif end == "end of the driver":
+            driver.loop.close()
+        else:
+            servos.unplug()
+            driver.wait_for_state(State.INACTIVE, "stopped working")
+            assert any("lowering ended, torque stays on" in text for text in driver.errors)
+            return
+        assert driver.torque() == set(IDS)
+        assert int.from_bytes(ahead, "little") > 512 + 33
+
+        def holds() -> bool:
+            last = servos.instructions(SYNC_WRITE)[-5:]
+            return all(abs(int.from_bytes(p[8:10], "little") - 512) <= 6 for p in last)
+
+        wait_for(holds, 5.0, "five cycles of hold")
+
+
 def test_recover_keeps_torque_off_that_was_switched_off(servos: ScriptedServos) -> None:
     with driving(servos) as driver:
         driver.loop.set_torque(False)
@@ -212,6 +292,8 @@ def test_a_thread_that_fails_lets_the_joints_hold_and_is_noticed(servos: Scripte
         driver.move()
         driver.on_publish = fail
         wait_for(ended, 10.0, "the end of the thread")
+        with pytest.raises(RefusedError, match="a mistake of the program"):
+            driver.loop.check()
         begin = time.monotonic()
         with pytest.raises(RefusedError, match="the bus thread has ended"):
             driver.loop.recover()
