@@ -239,6 +239,9 @@ def test_diagnostics_have_one_status_of_the_bus_and_one_of_each_servo(robot: Dri
     assert [servo.level for servo in state.servos] == [0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0]
     assert state.communication_error_rate < 0.1
     assert not state.emergency_stop
+    for posture in ("start posture", "posture found"):
+        warning = f"in the {posture} gravity asks more than the 0.3 N m"
+        assert robot.driver.output().count(warning) == 1
 
 
 def test_recover_on_a_healthy_bus_holds(robot: DrivenRobot) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 
 pytest.importorskip("rclpy")
@@ -9,9 +11,10 @@ pytest.importorskip("snake_interfaces")
 
 from snake_interfaces.msg import JointVelocityCommand
 
-from snake_control.config import BusDriverConfig
+from snake_control.config import BusDriverConfig, RobotConfig
 from snake_control.errors import ConfigError
 from snake_control.nodes.bus_command import CommandBuffer
+from snake_control.nodes.bus_load import StaticLoad
 from snake_control.nodes.bus_messages import InvalidCommandError, checked_velocities, time_message
 from snake_control.nodes.bus_schedule import Schedule
 
@@ -49,6 +52,26 @@ def test_a_look_ahead_shorter_than_two_cycles_is_refused() -> None:
     BusDriverConfig(rate_hz=20.0, look_ahead_s=0.1)
     with pytest.raises(ConfigError, match=r"look_ahead_s = 0.1: at least two bus cycles, 0.2 s"):
         BusDriverConfig(rate_hz=10.0, look_ahead_s=0.1)
+
+
+def test_joints_that_carry_more_than_they_should_are_named() -> None:
+    robot = RobotConfig()
+    load = StaticLoad(robot, 0.3)
+    # Straight and horizontal, the head hangs on joint 5: 5 links of 0.1 kg, 0.034 m half a length.
+    straight = load.expected((0.0,) * 11)
+    assert abs(straight[4]) == pytest.approx(5 * 0.1 * 9.81 * 5 * 0.034, rel=0.01)
+    assert straight[5:] == pytest.approx((0.0,) * 6)
+    text = load.too_much((0.0,) * 11)
+    assert "joint_5 0.83" in text
+    assert "joint_1 " not in text
+    assert StaticLoad(robot, 2.0).too_much((0.0,) * 11) == ""
+
+
+def test_nothing_is_expected_at_angles_that_are_not_known() -> None:
+    load = StaticLoad(RobotConfig(), 0.3)
+    assert all(map(math.isnan, load.expected((math.nan,) + (0.0,) * 10)))
+    assert load.too_much((math.nan,) + (0.0,) * 10) == ""
+    assert load.expected(()) == ()
 
 
 def test_velocities_come_in_joint_order_with_their_age() -> None:
