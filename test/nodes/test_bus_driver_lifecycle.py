@@ -17,7 +17,7 @@ from lifecycle_msgs.srv import ChangeState, GetState
 from snake_interfaces.msg import BusState
 
 from snake_control.nodes import topics
-from support.driven_robot import NAMES, DrivenRobot
+from support.driven_robot import NAMES, DrivenRobot, stamp
 from support.scripted_servos import PING, READ, ScriptedServos
 
 CHANGE = topics.Service("~/change_state", ChangeState)
@@ -151,6 +151,7 @@ def test_the_head_is_lowered_before_torque_goes_off(tmp_path: Path) -> None:
     with DrivenRobot(tmp_path, driver=lowering()) as robot:
         robot.wait_for_state(BusState.STATE_HOLDING)
         robot.command()
+        robot.graph.wait_for(lambda: robot.truth.last, 10.0, "the truth")
         begin = [angle(robot, name) for name in NAMES]
         answer = robot.call(topics.SET_TORQUE, data=False)
         assert (answer.success, answer.message.split(";")[0]) == (True, "lowering")
@@ -159,13 +160,18 @@ def test_the_head_is_lowered_before_torque_goes_off(tmp_path: Path) -> None:
         assert "~/emergency_stop ends that" in robot.call(topics.SET_TORQUE, data=False).message
         # Commands of motion do not disturb it.
         robot.ask(joint_9=1.0)
+        first = robot.truth.last
         robot.graph.wait_for(
             lambda: abs(angle(robot, "joint_5") - begin[4]) > 0.15, 10.0, "half of the way"
         )
-        speeds = [max(map(abs, truth.phi_dot)) for truth in robot.truth.messages]
+        last = robot.truth.last
         robot.wait_for_state(BusState.STATE_TORQUE_OFF)
         truths = robot.truth.messages
-        assert max(speeds) < 0.6, "slowly"
+        speeds = [
+            abs(b - a) / (stamp(last) - stamp(first))
+            for a, b in zip(first.phi, last.phi, strict=True)
+        ]
+        assert max(speeds) < 0.4, "slowly"
         nearest = min(
             max(abs(a - b) for a, b in zip(truth.phi[:5], ON_THE_FLOOR, strict=True))
             for truth in truths
