@@ -12,10 +12,10 @@ from concurrent.futures import Future
 from contextlib import contextmanager
 
 from snake_control.ax12.arming import disarm_confirmed, require_off
-from snake_control.ax12.chain import JointReading, ServoChain
-from snake_control.ax12.joint import joint_setups
+from snake_control.ax12.chain import ServoChain
+from snake_control.ax12.joint import WHEEL_MODE, joint_setups
 from snake_control.ax12.lowering import Phase
-from snake_control.config import BusDriverConfig, Config
+from snake_control.config import Config
 from snake_control.errors import BusError, ServoError, SnakeError
 from snake_control.nodes.bus_command import CommandBuffer
 from snake_control.nodes.bus_connection import READ_SHARE
@@ -290,8 +290,13 @@ class BusControl:
             return "emergency stop"
         if self._fault:
             return self._fault
-        unknown = [r.joint for r in chain.readings() if not _is_known(r, self._driver)]
-        return f"no fresh reading of {named(unknown)}" if unknown else ""
+        # An old reading is no obstacle: its joint waits for a new one, or soon stops the robot.
+        unknown = [
+            reading.joint
+            for reading in chain.readings()
+            if reading.joint.mode != WHEEL_MODE and not math.isfinite(reading.angle)
+        ]
+        return f"no reading of {named(unknown)}" if unknown else ""
 
     def _begin_descent(self) -> None:
         self._note = ""
@@ -400,7 +405,3 @@ class BusControl:
             self._stop(str(error))
         else:
             self._warn(f"port lost: {error}")
-
-
-def _is_known(reading: JointReading, driver: BusDriverConfig) -> bool:
-    return math.isfinite(reading.angle) and reading.age <= driver.feedback_timeout_s

@@ -189,6 +189,14 @@ def test_release_returns_when_torque_is_off_after_a_lowering(servos: ScriptedSer
         assert angle == pytest.approx(17.2, abs=2.5)  # degrees
 
 
+def test_a_reading_that_is_late_does_not_drop_the_robot(servos: ScriptedServos) -> None:
+    # Older than feedback_timeout_s all the time.
+    with lowering(servos, 0.5, feedback_timeout_s=0.01, rate_hz=20.0) as driver:
+        assert driver.loop.set_torque(False).startswith("lowering")
+        driver.wait_for_state(State.LOWERING)
+        assert driver.torque() == set(IDS)
+
+
 def test_release_says_why_torque_stays_on(servos: ScriptedServos) -> None:
     with lowering(servos, 0.5) as driver:
         with pytest.raises(NotLoweredError, match=r"joint_1 .* does not get nearer"):
