@@ -9,10 +9,12 @@ MAKEFLAGS += --no-print-directory
 CASE ?= 3
 DURATION ?= 60
 SEED ?= 1
+SCENARIO ?=
+PACKETS ?= 1000000
 PYTHON ?=
 export PYTHON
 
-.PHONY: help demo test lint bench clean setup build FORCE
+.PHONY: help demo test lint bench faults fuzz clean setup build FORCE
 
 help:
 	@printf '%s\n' \
@@ -21,6 +23,8 @@ help:
 	  'make test    lint, then all tests' \
 	  'make lint    style, types and the import rules' \
 	  'make bench   time control step, dynamics and lockstep; results in out/bench.json' \
+  'make faults  try driver and mock with every fault; table in out/faults.md  SCENARIO=name for one' \
+  'make fuzz    a million random packets against the mock and the driver  PACKETS=n' \
 	  'make clean   remove all that the others made' \
 	  '' \
 	  'Each does the set-up that it needs, once: packages in .venv, messages in install.' \
@@ -74,6 +78,12 @@ lint: .venv/ready
 
 bench: build/ready .venv/bench
 	@. scripts/env.sh && python -m benchmarks.run
+
+faults: build/ready
+	@. scripts/env.sh && PYTHONPATH=.:test:$$PYTHONPATH exec python -m faults.campaign $(SCENARIO)
+
+fuzz: build/ready
+	@. scripts/env.sh && PYTHONPATH=.:test:$$PYTHONPATH exec python -m fuzz.run --packets $(PACKETS)
 
 clean:
 	rm -rf .venv build install log out .pytest_cache .ruff_cache .mypy_cache \

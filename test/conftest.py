@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-_REAL_TIME = ("nodes", "cli")
+_REAL_TIME = ("nodes", "cli", "faults")
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

@@ -123,7 +123,7 @@ def judge(scenario: Scenario, record: Record, config: Config) -> Outcome:
     outcome.did = _did(scenario, after, stops)
     if scenario.expect is Expect.STOPS and not stops:
         wrong.append("did not stop")
-    if scenario.expect is Expect.GOES_ON and stops:
+    if scenario.expect in (Expect.GOES_ON, Expect.RESTS) and stops:
         wrong.append(f"stopped: {stops[0][1]}")
     _check_rest(scenario, record, config, outcome, bool(stops))
     _check_travel(scenario, record, config, outcome, stops[0][0] if stops else None)
@@ -165,10 +165,13 @@ def _check_rest(
     scenario: Scenario, record: Record, config: Config, outcome: Outcome, stopped: bool
 ) -> None:
     """Whether all joints with torque came to rest, in time where a command can bring that about."""
-    if scenario.expect not in (Expect.STOPS, Expect.ENDS) and not stopped:
+    if scenario.expect in (Expect.GOES_ON, Expect.SAFE) and not stopped:
         return
     limp = np.array([servo_id in scenario.limp for servo_id in config.servos.ids])
-    watched = (record.time >= record.fault_at) & (record.time <= record.until)
+    until = record.until
+    if scenario.expect is Expect.RESTS and scenario.duration:
+        until = min(until, record.fault_at + scenario.duration)
+    watched = (record.time >= record.fault_at) & (record.time <= until)
     time = record.time[watched]
     speed = np.abs(record.phi_dot[watched])
 
@@ -181,7 +184,7 @@ def _check_rest(
         outcome.violations.append("never came to rest")
         return
     led = _led(scenario, config)
-    if scenario.expect is not Expect.STOPS or not led.any():
+    if scenario.expect not in (Expect.STOPS, Expect.RESTS) or not led.any():
         return
     bound = (
         timeouts(config)[scenario.timeout]

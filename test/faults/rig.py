@@ -19,6 +19,7 @@ from snake_interfaces.msg import BusState
 
 from snake_control.config import Config, load
 from snake_control.nodes import topics
+from snake_control.nodes.recorder import FOLLOWING
 from support.driven_robot import NAMES, DrivenRobot, stamp
 from support.graph import CONFIG
 from support.process import Process
@@ -320,14 +321,18 @@ class Rig:
                 try:
                     robot.graph.wait_for(
                         lambda: (
-                            robot.states.last.text == "" and bus.last.state == BusState.STATE_MOVING
+                            robot.states.last.status in FOLLOWING
+                            and bus.last.state == BusState.STATE_MOVING
                         ),
                         10.0,
                         "motion again",
                     )
-                except AssertionError as error:
+                except AssertionError:
                     outcome.recovered = "no"
-                    outcome.violations.append(str(error).splitlines()[0])
+                    outcome.violations.append(
+                        f"no motion again: the controller says {robot.states.last.text!r} "
+                        f"(status {robot.states.last.status}), the driver {bus.last.text!r}"
+                    )
             return outcome
 
 

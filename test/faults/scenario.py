@@ -17,6 +17,9 @@ class Expect(enum.Enum):
 
     GOES_ON = "goes_on"
     """Nothing but a report: too little happened to stop a robot."""
+    RESTS = "rests"
+    """Nobody commands it any more: it comes to rest within its time, says why, and moves again when
+    it is commanded again."""
     STOPS = "stops"
     """Comes to rest within its time, says why, and moves again only after what `after` says."""
     SAFE = "safe"
