@@ -9,7 +9,7 @@ import os
 import platform
 from pathlib import Path
 
-from benchmarks import dynamics, growth, lockstep, pink_ik
+from benchmarks import bus_cycle, dynamics, growth, lockstep, pink_ik
 
 # Name in the result: what measures it, from the number of blocks and of calls in a block.
 BENCHMARKS = {
@@ -18,6 +18,7 @@ BENCHMARKS = {
     "plant_step": growth.measure_plant,
     "reduced_dynamics": dynamics.measure,
     "lockstep_case_3": lockstep.measure,
+    "bus_cycle": bus_cycle.measure,
 }
 
 

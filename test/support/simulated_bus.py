@@ -50,6 +50,7 @@ class MemoryPort(PortHandler):
 
     Attributes:
         reply_timeout_s: beyond the time on the wire, as ``ax12.port.SerialPort`` has it.
+        received: what was read since somebody emptied it.
         alter: makes something else of the bytes that arrive (they are as a list of time, bytes).
     """
 
@@ -57,6 +58,7 @@ class MemoryPort(PortHandler):
         super().__init__("memory")
         self.reply_timeout_s = reply_timeout_s
         self.alter: Callable[[list[tuple[float, bytes]]], list[tuple[float, bytes]]] | None = None
+        self.received = b""
         self.is_open = True
         self._world = world
         self._coming: list[tuple[float, bytes]] = []
@@ -91,6 +93,7 @@ class MemoryPort(PortHandler):
             self._world.pass_until(min(at, self._deadline))
             self._arrive()
         data, self._unread = self._unread[:length], self._unread[length:]
+        self.received += data
         return data
 
     def setPacketTimeout(self, packet_length: int) -> None:
