@@ -1,7 +1,9 @@
 """Switching torque on without a jump: goal = where the joint is, settings, then torque.
 
 The RAM area is lost at a power cycle: torque off, Moving Speed 0 (full speed), compliance at its
-defaults. So everything that matters is written each time, and read back, before torque is on.
+defaults. So everything that matters is written each time, and read back, before torque is on. A
+free joint may move while the others get their settings: right before its torque its goal is set
+once more to where it is.
 """
 
 from __future__ import annotations
@@ -24,6 +26,9 @@ _RAM = ct.TORQUE_ENABLE.address
 _RAM_LENGTH = ct.TABLE_END - _RAM
 _WATCHED = ct.TORQUE_LIMIT.end - _RAM
 
+_STILL_TICKS = 6
+_SETTLE_TRIES = 3
+
 
 @dataclasses.dataclass(frozen=True)
 class Seed:
@@ -32,12 +37,21 @@ class Seed:
     Attributes:
         goal_ticks: goal written; 0 in wheel mode, where none is.
         angle: the same as servo angle [rad].
+        measured: servo angle that was read [rad]; a held joint hangs a droop away from its goal.
         had_torque: whether it was held before.
     """
 
     goal_ticks: int
     angle: float
+    measured: float
     had_torque: bool
+
+
+class _Before(NamedTuple):
+    """A servo's RAM before anything is written, and whether it holds its joint."""
+
+    ram: bytes
+    holds: bool
 
 
 def arm(bus: Bus, joints: Sequence[JointSetup], servos: Sequence[ServoInfo]) -> tuple[Seed, ...]:
@@ -57,22 +71,26 @@ def arm(bus: Bus, joints: Sequence[JointSetup], servos: Sequence[ServoInfo]) -> 
 def _arm(bus: Bus, joints: Sequence[JointSetup], servos: Sequence[ServoInfo]) -> tuple[Seed, ...]:
     findings: list[str] = []
     seeds: list[Seed] = []
+    free: list[JointSetup] = []
     for joint, servo in zip(joints, servos, strict=True):
         try:
-            seeds.append(_seed(bus, joint, servo))
+            before = _look(bus, joint, servo)
+            if not before.holds:
+                free.append(joint)
+            seeds.append(_seed(bus, joint, servo, before))
         except ServoError as error:
             findings.extend(f"{joint}: {text}" for text in error.findings)
+    if not findings:
+        for i, (joint, servo) in enumerate(zip(joints, servos, strict=True)):
+            try:
+                seeds[i] = _settle(bus, joint, servo, seeds[i])
+                bus.write_verified(joint.servo_id, ct.TORQUE_ENABLE.address, b"\x01")
+            except ServoError as error:
+                findings.extend(f"{joint}: no torque: {text}" for text in error.findings)
     if findings:
-        raise ServoError(findings)
-    for joint in joints:
-        try:
-            bus.write_verified(joint.servo_id, ct.TORQUE_ENABLE.address, b"\x01")
-        except ServoError as error:
-            findings.extend(f"{joint}: no torque: {text}" for text in error.findings)
-    if findings:
-        fresh = [joint for joint, seed in zip(joints, seeds, strict=True) if not seed.had_torque]
-        if fresh:
-            disarm(bus, fresh)
+        # Also where torque was not asked for yet: a servo may take a goal or a speed as such.
+        if free:
+            disarm(bus, free)
         raise ServoError(findings)
     return tuple(seeds)
 
@@ -148,7 +166,7 @@ def check_armed(bus: Bus, joint: JointSetup) -> Armed | None:
     return Armed(torque, shut_down, wrong)
 
 
-def _seed(bus: Bus, joint: JointSetup, servo: ServoInfo) -> Seed:
+def _look(bus: Bus, joint: JointSetup, servo: ServoInfo) -> _Before:
     before = bus.read(joint.servo_id, _RAM, _RAM_LENGTH)
     if before is None:
         raise ServoError(["does not answer"])
@@ -161,52 +179,45 @@ def _seed(bus: Bus, joint: JointSetup, servo: ServoInfo) -> Seed:
     if enabled and limp:
         # Else its torque would return with the torque limit, before the others are ready.
         bus.write_verified(joint.servo_id, ct.TORQUE_ENABLE.address, b"\x00")
-    held = enabled and not limp
-    torque_limit = _torque_limit(joint, servo)
+    return _Before(before.data, enabled and not limp)
+
+
+def _seed(bus: Bus, joint: JointSetup, servo: ServoInfo, before: _Before) -> Seed:
+    torque_limit = ct.TORQUE_LIMIT.encode(_torque_limit(joint, servo))
     if joint.mode == WHEEL_MODE:
-        goal = 0
-        motion = ct.MOVING_SPEED.encode(0) + ct.TORQUE_LIMIT.encode(torque_limit)
+        seed = Seed(0, 0.0, 0.0, before.holds)
+        motion = ct.MOVING_SPEED.encode(0) + torque_limit
         address = ct.MOVING_SPEED.address
         bus.write_verified(joint.servo_id, ct.CW_COMPLIANCE_MARGIN.address, _compliance(joint))
     else:
-        goal = _goal_to_hold(joint, servo, before.data, held)
+        position = ct.PRESENT_POSITION.decode(before.ram, _RAM)
+        goal = _goal_to_hold(joint, servo, before, position)
+        _require_possible(joint, servo, position, goal)
+        seed = Seed(goal, ticks_to_rad(goal), ticks_to_rad(position), before.holds)
         motion = _compliance(joint) + ct.GOAL_POSITION.encode(goal)
-        motion += ct.MOVING_SPEED.encode(SEED_SPEED_RAW) + ct.TORQUE_LIMIT.encode(torque_limit)
+        motion += ct.MOVING_SPEED.encode(SEED_SPEED_RAW) + torque_limit
         address = ct.CW_COMPLIANCE_MARGIN.address
     # One packet: the goal must not be in force with a speed or a compliance not meant for it.
     bus.write_verified(joint.servo_id, address, motion)
     bus.write_verified(joint.servo_id, ct.PUNCH.address, ct.PUNCH.encode(joint.punch_raw))
-    return Seed(goal, ticks_to_rad(goal) if joint.mode != WHEEL_MODE else 0.0, held)
+    return seed
 
 
-def _goal_to_hold(joint: JointSetup, servo: ServoInfo, ram: bytes, held: bool) -> int:
-    position = ct.PRESENT_POSITION.decode(ram, _RAM)
-    if position > MAX_TICKS:
-        raise ServoError([f"reports position {position}, which does not exist"])
-    goal = ct.GOAL_POSITION.decode(ram, _RAM)
-    at_rest = decode_signed(ct.PRESENT_SPEED.decode(ram, _RAM)) == 0
-    if held and at_rest:
-        kept = _goal_that_holds(joint, servo, ram, position, goal)
-        if kept is not None:
-            return kept
-    if not servo.goal_allowed(position):
-        raise ServoError(
-            [
-                f"stands at {joint.to_joint(ticks_to_rad(position)):.3f} rad, outside its servo's "
-                "angle limits, where it cannot be held: turn it inside by hand with torque off"
-            ]
-        )
-    return position
+def _goal_to_hold(joint: JointSetup, servo: ServoInfo, before: _Before, position: int) -> int:
+    at_rest = decode_signed(ct.PRESENT_SPEED.decode(before.ram, _RAM)) == 0
+    kept = (
+        _goal_that_holds(joint, servo, before.ram, position) if before.holds and at_rest else None
+    )
+    return position if kept is None else kept
 
 
-def _goal_that_holds(
-    joint: JointSetup, servo: ServoInfo, ram: bytes, position: int, goal: int
-) -> int | None:
+def _goal_that_holds(joint: JointSetup, servo: ServoInfo, ram: bytes, position: int) -> int | None:
     """Return the goal with which a servo that holds goes on as it does, by the settings to come.
 
     It rests a droop away from its goal; with goal = position it would let go of that, and sag.
     ``None`` if where it rests does not tell its load, or that goal is not allowed.
     """
+    goal = ct.GOAL_POSITION.decode(ram, _RAM)
     found = Compliance.found(ram, _RAM, goal > position)
     wanted = Compliance.configured(joint, _torque_limit(joint, servo))
     distance: float = abs(goal - position)
@@ -227,6 +238,37 @@ def _goal_that_holds(
 
 def _torque_limit(joint: JointSetup, servo: ServoInfo) -> int:
     return min(joint.torque_limit_raw, servo.max_torque_raw)
+
+
+def _require_possible(joint: JointSetup, servo: ServoInfo, position: int, goal: int) -> None:
+    if position > MAX_TICKS:
+        raise ServoError([f"reports position {position}, which does not exist"])
+    if not servo.goal_allowed(goal):
+        raise ServoError(
+            [
+                f"stands at {joint.to_joint(ticks_to_rad(goal)):.3f} rad, outside its servo's "
+                "angle limits, where it cannot be held: turn it inside by hand with torque off"
+            ]
+        )
+
+
+def _settle(bus: Bus, joint: JointSetup, servo: ServoInfo, seed: Seed) -> Seed:
+    """Return the seed of a joint that is free until now, for where it is by now."""
+    if seed.had_torque or joint.mode == WHEEL_MODE:
+        return seed
+    for _ in range(_SETTLE_TRIES):
+        reply = bus.read(joint.servo_id, ct.PRESENT_POSITION.address, ct.PRESENT_POSITION.size)
+        if reply is None:
+            raise ServoError(["does not answer"])
+        position = ct.PRESENT_POSITION.decode(reply.data, ct.PRESENT_POSITION.address)
+        _require_possible(joint, servo, position, position)
+        if abs(position - seed.goal_ticks) <= _STILL_TICKS:
+            return seed
+        goal = ct.GOAL_POSITION.encode(position)
+        bus.write_verified(joint.servo_id, ct.GOAL_POSITION.address, goal)
+        angle = ticks_to_rad(position)
+        seed = dataclasses.replace(seed, goal_ticks=position, angle=angle, measured=angle)
+    raise ServoError(["it does not stand still, or its readings jump"])
 
 
 def _compliance(joint: JointSetup) -> bytes:

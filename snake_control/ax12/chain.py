@@ -20,7 +20,7 @@ from snake_control.ax12.arming import (
     require_off,
 )
 from snake_control.ax12.bus import Bus, Counters
-from snake_control.ax12.eeprom import ServoInfo
+from snake_control.ax12.eeprom import ServoInfo, effective_range
 from snake_control.ax12.feedback import Feedback
 from snake_control.ax12.following import FollowWatch
 from snake_control.ax12.joint import WHEEL_MODE, JointSetup
@@ -43,7 +43,6 @@ from snake_control.ax12.velocity import (
 )
 from snake_control.errors import ServoError
 
-_CHECK_PERIOD_S = 0.1
 _ALARMS_IN_ROW = 2
 
 FEEDBACK_LOST_S = 0.5
@@ -65,6 +64,8 @@ class Motion:
         acceleration: see ``VelocityLimits``.
         lost_after_misses: missed reads in a row after which a servo counts as lost.
         follow_time: how long a joint may not do what it is told [s] (see ``FollowWatch``).
+        slow_period: within which voltage and temperature of each servo are read [s]; with
+            ``period`` or less all of it is read in each cycle.
     """
 
     period: float
@@ -72,6 +73,7 @@ class Motion:
     acceleration: float
     lost_after_misses: int
     follow_time: float = 1.0
+    slow_period: float = 0.5
 
 
 @dataclasses.dataclass(frozen=True)
@@ -91,6 +93,7 @@ class JointReading:
         error_rate: share of the last requests without a good reply at the first try, 0 to 1.
         goal: Goal Position last sent or rehearsed [rad]; NaN before, and in wheel mode.
         goal_speed: Moving Speed with it [rad/s]; in wheel mode with the sign of the output.
+        doubt: why it may not go where it is told; empty if it does.
     """
 
     joint: JointSetup
@@ -109,6 +112,7 @@ class JointReading:
     error_rate: float
     goal: float
     goal_speed: float
+    doubt: str
 
 
 class _Servo:
@@ -133,7 +137,7 @@ class _Servo:
             self.control = WheelModeVelocity(limits, no_load)
         else:
             self.control = JointModeVelocity(limits)
-        self.feedback = Feedback(no_load, self.wheel)
+        self.feedback = Feedback(no_load, self.wheel, motion.period)
         self.following = FollowWatch(motion.follow_time)
         self.speed_unit = no_load / MAX_RAW if self.wheel else RAD_S_PER_SPEED_UNIT
         self.torque_on = False
@@ -170,8 +174,8 @@ class ServoChain:
         self._lost_after = motion.lost_after_misses
         self._armed = False
         self._written_at = -math.inf
-        self._telemetry = TelemetrySchedule(len(self._servos), motion.period)
-        self._checked_at = clock()
+        self._look_ahead = motion.look_ahead
+        self._telemetry = TelemetrySchedule(len(self._servos), motion.period, motion.slow_period)
         self._finding = ""
 
     @property
@@ -191,6 +195,11 @@ class ServoChain:
     def joints(self) -> tuple[JointSetup, ...]:
         """The setup of every joint."""
         return tuple(servo.joint for servo in self._servos)
+
+    @property
+    def ranges(self) -> tuple[tuple[float, float], ...]:
+        """Range of each joint [rad]: the configured one within its servo's own angle limits."""
+        return tuple(effective_range(servo.joint, servo.info) for servo in self._servos)
 
     @property
     def error_rate(self) -> float:
@@ -222,7 +231,7 @@ class ServoChain:
             servo.following.reset()
             servo.heard_at = self._written_at
             servo.asked_in_vain = servo.alarms_in_row = 0
-            servo.feedback.forget()
+            servo.feedback.start(None if servo.wheel else seed.measured, self._written_at)
 
     def disarm(self) -> None:
         """Switch torque off: the joints are free.
@@ -258,7 +267,10 @@ class ServoChain:
         for i, servo in enumerate(self._servos):
             present = servo.present(now)
             if not servo.wheel:
-                servo.following.step(servo.control.velocity, dt, present.angle)
+                # During a pause of this process a joint goes no farther than the look-ahead.
+                led = min(dt, self._look_ahead)
+                velocity, load = servo.control.velocity, servo.feedback.load
+                servo.following.step(velocity, led, present.angle, load)
             if velocities is None:
                 sent = servo.control.stop(dt, present)
             else:
@@ -300,25 +312,28 @@ class ServoChain:
         """
         begin = self._clock()
         lost = frozenset(i for i, servo in enumerate(self._servos) if self._is_lost(servo))
-        for number, request in enumerate(self._telemetry.cycle(lost, begin)):
-            if number and self._clock() >= until:
+        asked = self._check(self._telemetry.check(lost, begin, spare=False))
+        for request in self._telemetry.cycle(lost, begin):
+            if asked and self._clock() >= until:
                 return
             answered = self._read_one(self._servos[request.servo], request, until)
             self._telemetry.asked(request, begin, answered)
+            asked = True
         now = self._clock()
-        if now - self._checked_at >= _CHECK_PERIOD_S and now < until:
-            self._checked_at = now
-            index = self._telemetry.next_check(lost)
-            if index is not None:
-                self._check(self._servos[index])
+        if now < until:
+            self._check(self._telemetry.check(lost, now, spare=True))
 
-    def _check(self, servo: _Servo) -> None:
+    def _check(self, index: int | None) -> bool:
+        """Look at the settings of a servo; return whether any was asked."""
+        if index is None:
+            return False
+        servo = self._servos[index]
         found = check_armed(self._bus, servo.joint)
-        if found is None:
-            return
-        servo.torque_on, servo.shut_down = found.torque_on, found.shut_down
-        if found.wrong and self._armed:
-            self._finding = f"{servo.joint}: {found.wrong}"
+        if found is not None:
+            servo.torque_on, servo.shut_down = found.torque_on, found.shut_down
+            if found.wrong and self._armed:
+                self._finding = f"{servo.joint}: {found.wrong}"
+        return True
 
     def readings(self) -> list[JointReading]:
         """Return every joint as last seen."""
@@ -350,11 +365,13 @@ class ServoChain:
             return f"no believable reading for {FEEDBACK_LOST_S:g} s from " + ", ".join(
                 map(str, unheard)
             )
-        stuck = [servo.joint for servo in self._servos if servo.following.failed]
+        stuck = [
+            f"{servo.joint} ({servo.following.doubt})"
+            for servo in self._servos
+            if servo.following.failed
+        ]
         if stuck:
-            return "told to move and not seen moving (blocked, or its sensor is stuck): " + (
-                ", ".join(map(str, stuck))
-            )
+            return "told to move and not seen moving: " + ", ".join(stuck)
         return self._finding
 
     def _read_one(self, servo: _Servo, request: Request, until: float) -> bool:
@@ -415,4 +432,5 @@ class ServoChain:
             error_rate=counters.error_rate,
             goal=goal,
             goal_speed=goal_speed,
+            doubt=servo.following.doubt,
         )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Collection
 
 from snake_control.ax12 import control_table as ct
@@ -181,13 +182,23 @@ def _goal_range(joint: JointSetup, block: bytes) -> tuple[int, int]:
     return max(cw, joint.range_ticks[0]), min(ccw, joint.range_ticks[1])
 
 
+def effective_range(joint: JointSetup, servo: ServoInfo) -> tuple[float, float]:
+    """Return the range [rad] of a joint within its servo's angle limits; all in wheel mode."""
+    if joint.mode == WHEEL_MODE:
+        return -math.inf, math.inf
+    low, high = sorted(
+        joint.to_joint(ticks_to_rad(t)) for t in (servo.lower_ticks, servo.upper_ticks)
+    )
+    return max(low, joint.lower), min(high, joint.upper)
+
+
 def _narrowed(joint: JointSetup, servo: ServoInfo) -> str:
     if joint.mode == WHEEL_MODE or (servo.lower_ticks, servo.upper_ticks) == joint.range_ticks:
         return ""
-    ends = sorted(joint.to_joint(ticks_to_rad(t)) for t in (servo.lower_ticks, servo.upper_ticks))
+    low, high = effective_range(joint, servo)
     return (
         f"the servo's angle limits narrow its range from {joint.lower:.3f}..{joint.upper:.3f} to "
-        f"{ends[0]:.3f}..{ends[1]:.3f} rad"
+        f"{low:.3f}..{high:.3f} rad"
     )
 
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 
 from snake_control.ax12 import control_table as ct
+from snake_control.ax12.gate import PositionGate
 from snake_control.ax12.units import (
     JOINT_NO_LOAD_RAD_S,
     MAX_RAW,
     MAX_SIGNED_RAW,
     MAX_TICKS,
-    RAD_PER_TICK,
     RAD_S_PER_SPEED_UNIT,
     decode_signed,
     load_to_fraction,
@@ -19,8 +19,6 @@ from snake_control.ax12.units import (
 )
 
 _MAX_SHARE = 1.15
-
-_SLACK_TICKS = 4
 
 
 class Feedback:
@@ -39,13 +37,19 @@ class Feedback:
         invalid_values: how many replies were not believed.
     """
 
-    def __init__(self, no_load_speed: float = JOINT_NO_LOAD_RAD_S[12], wheel: bool = False) -> None:
+    def __init__(
+        self,
+        no_load_speed: float = JOINT_NO_LOAD_RAD_S[12],
+        wheel: bool = False,
+        period: float = 0.02,
+    ) -> None:
         """Start without any reply.
 
         Args:
             no_load_speed: of the servo [rad/s]; a faster change is a misreading.
             wheel: whether it is in wheel mode, where units of Present Speed are shares of the
                 speed without load (e-manual).
+            period: nominal time between two replies [s].
         """
         self._speed_unit = no_load_speed / MAX_RAW if wheel else RAD_S_PER_SPEED_UNIT
         self._max_rate = _MAX_SHARE * no_load_speed
@@ -57,18 +61,25 @@ class Feedback:
         self.error_bits = 0
         self.read_at = self.slow_read_at = -math.inf
         self.invalid_values = 0
+        self._gate = PositionGate(self._max_rate, wheel, period)
 
-    def forget(self) -> None:
-        """Believe the next reply whatever was read before."""
+    def start(self, angle: float | None, now: float) -> None:
+        """Judge the next replies by an angle that is known [rad], or by nothing if ``None``.
+
+        What was read before is old from now on.
+        """
         self.read_at = -math.inf
+        self._gate.open()
+        if angle is not None:
+            self._gate.start(angle, now)
 
     def take(self, block: bytes, error_bits: int, now: float) -> bool:
         """Take 6 or 8 bytes from Present Position on; return whether they were believed.
 
         Position and speed are refused together when one is out of its range, when the speed is
-        more than the servo can turn, or when the position changed faster: readings in the dead
-        zone of a wheel-mode servo (300 to 360 degrees) are of this kind. Voltage and temperature,
-        of 8 bytes the last two, do not depend on that.
+        more than the servo can turn, or when the position contradicts the earlier ones (see
+        ``PositionGate``): readings in the dead zone of the sensor (300 to 360 degrees) are of this
+        kind. Voltage and temperature, of 8 bytes the last two, do not depend on that.
         """
         self.error_bits = error_bits
         at = ct.PRESENT_POSITION.address
@@ -78,17 +89,16 @@ class Feedback:
             self.slow_read_at = now
         position = ct.PRESENT_POSITION.decode(block, at)
         speed = ct.PRESENT_SPEED.decode(block, at)
-        if position > MAX_TICKS or speed > MAX_SIGNED_RAW:
-            self.invalid_values += 1
-            return False
-        angle = ticks_to_rad(position)
         rate = decode_signed(speed) * self._speed_unit
-        reach = self._max_rate * (now - self.read_at) + _SLACK_TICKS * RAD_PER_TICK
-        # The second is false while the angle is NaN.
-        if abs(rate) > self._max_rate or abs(angle - self.angle) > reach:
+        if (
+            position > MAX_TICKS
+            or speed > MAX_SIGNED_RAW
+            or abs(rate) > self._max_rate
+            or not self._gate.takes(ticks_to_rad(position), now)
+        ):
             self.invalid_values += 1
             return False
-        self.angle = angle
+        self.angle = ticks_to_rad(position)
         self.rate = rate
         self.load = load_to_fraction(ct.PRESENT_LOAD.decode(block, at))
         self.read_at = now

@@ -2,53 +2,81 @@
 
 from __future__ import annotations
 
-from snake_control.ax12.units import RAD_PER_TICK
+from snake_control.ax12.units import RAD_PER_TICK, RAD_S_PER_SPEED_UNIT
 
 _SHARE = 0.1
 _LEAST_RAD = 8 * RAD_PER_TICK
+_CREEPING = 5 * RAD_S_PER_SPEED_UNIT
+_HIGH_LOAD = 0.5
 
 
 class FollowWatch:
     """Compares the way that a joint was told to make with the one that it made.
 
-    Way is judged over windows of ``time`` seconds; a reversal or a rest begins a new one. Too
-    little way to be told from the steps of the sensor (8 positions) says nothing.
+    Way is judged over windows of half the time; a reversal or a rest begins a new one. A window
+    with less than a tenth of the way is a doubt, a second one in a row a failure. Too little way
+    to be told from the steps of the sensor (8 positions) says nothing. At speeds so low that a
+    servo may stay where it is (below 5 units of Moving Speed) only one that pushes is judged.
+
+    Attributes:
+        doubt: what seems to be wrong, empty if nothing.
+        failed: whether the robot must stop for it.
     """
 
     def __init__(self, time: float) -> None:
-        """Start at rest; ``time`` is the length of a window [s]."""
-        self._time = time
+        """Start at rest.
+
+        Args:
+            time: how long a joint may stay behind [s].
+        """
+        self._window = 0.5 * time
         self.reset()
 
     def reset(self) -> None:
         """Forget everything."""
         self._direction = 0
-        self._begun_at: float | None = None
-        self._elapsed = self._wanted = 0.0
+        self.doubt = ""
         self.failed = False
+        self._begin(0.0)
 
-    def step(self, velocity: float, dt: float, angle: float) -> None:
+    def _begin(self, angle: float) -> None:
+        self._begun_at = angle
+        self._elapsed = self._wanted = 0.0
+        self._pushes = self._fast = self._frozen = True
+
+    def step(self, velocity: float, dt: float, angle: float, load: float) -> None:
         """Account for a cycle.
 
         Args:
             velocity: what the joint was told until now [rad/s].
             dt: for how long [s].
             angle: where it was last seen [rad].
+            load: its load as fraction of the maximum output.
         """
         direction = (velocity > 0.0) - (velocity < 0.0)
-        if direction != self._direction or self._begun_at is None:
+        if direction != self._direction:
             self.reset()
             self._direction = direction
-            self._begun_at = angle
+            self._begin(angle)
             return
         if direction == 0:
             return
         self._elapsed += dt
         self._wanted += abs(velocity) * dt
-        if self._elapsed < self._time:
+        self._pushes = self._pushes and abs(load) >= _HIGH_LOAD
+        self._fast = self._fast and abs(velocity) >= _CREEPING
+        self._frozen = self._frozen and angle == self._begun_at
+        if self._elapsed < self._window or self._wanted < _LEAST_RAD:
             return
         made = direction * (angle - self._begun_at)
-        if self._wanted >= _LEAST_RAD:
-            self.failed = not made >= _SHARE * self._wanted
-            self._elapsed = self._wanted = 0.0
-            self._begun_at = angle
+        follows = made >= _SHARE * self._wanted or not (self._fast or self._pushes)
+        self.failed = not follows and self.doubt != ""
+        self.doubt = "" if follows else self._why(load)
+        self._begin(angle)
+
+    def _why(self, load: float) -> str:
+        if self._pushes:
+            return f"blocked? load {100 * abs(load):.0f} %"
+        if self._frozen:
+            return "its position does not change: sensor stuck, or no drive?"
+        return "it moves otherwise than told"

@@ -81,6 +81,8 @@ def judge(
         warnings.append(f"{reading.voltage:.1f} V")
     if abs(reading.load) >= thresholds.load:
         warnings.append(f"load {100 * abs(reading.load):.0f} %")
+    if reading.doubt:
+        warnings.append(f"does not follow: {reading.doubt}")
     if reading.error_rate >= thresholds.communication_error_rate:
         warnings.append(f"{100 * reading.error_rate:.0f} % of its replies fail at the first try")
     if abs(expected_torque) > thresholds.torque_n_m:

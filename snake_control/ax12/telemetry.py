@@ -7,6 +7,9 @@ servos, the one that was asked longest ago is next; one that does not answer, an
 several, so costs the others a turn and never two in a row.
 
 A servo that counts as lost is asked once in ``lost_period``, only to see whether it is back.
+
+Settings in RAM are looked at in turn, one servo in ``check_period``: in time that the reads leave
+over, but when they leave none for ``_CHECK_LATE`` periods, before them.
 """
 
 from __future__ import annotations
@@ -20,6 +23,9 @@ SHORT_LENGTH = ct.PRESENT_VOLTAGE.address - ct.PRESENT_POSITION.address
 FULL_LENGTH = ct.FEEDBACK_BLOCK[1]
 
 
+_CHECK_LATE = 2.5
+
+
 class Request(NamedTuple):
     """What to read from Present Position on: of which servo (its index), how many bytes."""
 
@@ -31,7 +37,12 @@ class TelemetrySchedule:
     """The order of reads. Times are monotonic [s]."""
 
     def __init__(
-        self, count: int, period: float, slow_period: float = 0.5, lost_period: float = 0.5
+        self,
+        count: int,
+        period: float,
+        slow_period: float = 0.5,
+        lost_period: float = 0.5,
+        check_period: float = 0.1,
     ) -> None:
         """Begin with nobody asked.
 
@@ -40,12 +51,15 @@ class TelemetrySchedule:
             period: nominal time between two cycles [s].
             slow_period: within which each servo's voltage and temperature are read [s].
             lost_period: between two questions to a lost servo [s].
+            check_period: between two looks at the settings of servos [s].
         """
         self._full_per_cycle = min(count, math.ceil(count * period / slow_period))
         self._lost_period = lost_period
         self._asked_at = [-math.inf] * count
         self._slow_at = [-math.inf] * count
-        self._check = 0
+        self._check_period = check_period
+        self._checked = 0
+        self._checked_at: float | None = None
 
     def cycle(self, lost: frozenset[int], now: float) -> list[Request]:
         """Return what to read in the cycle that begins now, most urgent first.
@@ -72,12 +86,24 @@ class TelemetrySchedule:
         if answered and request.length == FULL_LENGTH:
             self._slow_at[request.servo] = now
 
-    def next_check(self, lost: frozenset[int]) -> int | None:
-        """Return whose settings to look at next, each in turn; ``None`` if all are lost."""
+    def check(self, lost: frozenset[int], now: float, spare: bool) -> int | None:
+        """Return whose settings to look at now, each in turn; ``None`` if nobody's.
+
+        Args:
+            lost: indices of servos that count as lost.
+            now: the time.
+            spare: whether the cycle's reads are done; before them only what is late is returned.
+        """
+        if self._checked_at is None:
+            self._checked_at = now
+        due = self._check_period if spare else _CHECK_LATE * self._check_period
+        if now - self._checked_at < due:
+            return None
+        self._checked_at = now
         count = len(self._asked_at)
         for step in range(1, count + 1):
-            index = (self._check + step) % count
+            index = (self._checked + step) % count
             if index not in lost:
-                self._check = index
+                self._checked = index
                 return index
         return None

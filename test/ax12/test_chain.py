@@ -11,12 +11,11 @@ import pytest
 
 from snake_control.ax12.bus import Bus
 from snake_control.ax12.chain import Motion, ServoChain
-from snake_control.ax12.feedback import Feedback
 from snake_control.ax12.health import HealthLog, Level, Thresholds, Verdict, judge
 from snake_control.ax12.joint import JointSetup
 from snake_control.ax12.port import SerialPort
 from snake_control.ax12.startup import handshake
-from snake_control.ax12.units import RAD_PER_TICK, RAD_S_PER_SPEED_UNIT, ticks_to_rad
+from snake_control.ax12.units import RAD_PER_TICK, RAD_S_PER_SPEED_UNIT
 from snake_control.errors import BusError, ServoError
 from support.scripted_servos import PING, READ, SYNC_WRITE, ScriptedServos, packet
 from support.waiting import wait_for
@@ -258,32 +257,6 @@ def test_an_unplugged_port_is_a_bus_error(chain: ServoChain, servos: ScriptedSer
         chain.write(None)
 
 
-@pytest.mark.parametrize(
-    ("position", "speed"),
-    [(1024, 0), (600, 3154), (512, 1023), (512, 2047), (700, 0)],
-    ids=["range", "speed", "fast", "fast back", "jump"],
-)
-def test_an_unbelievable_reply_is_not_taken(position: int, speed: int) -> None:
-    feedback = Feedback()
-    good = bytes((0, 2, 0, 0, 0, 0, 111, 40))
-    assert feedback.take(good, 0, 1.0)
-    bad = bytes((*position.to_bytes(2, "little"), *speed.to_bytes(2, "little"), 0, 0, 111, 40))
-    assert not feedback.take(bad, 4, 1.02)
-    assert feedback.angle == 0.0
-    assert feedback.read_at == 1.0
-    assert feedback.invalid_values == 1
-    assert feedback.error_bits == 4
-
-
-def test_a_joint_that_was_turned_while_unread_is_believed_again() -> None:
-    feedback = Feedback()
-    feedback.take(bytes((0, 2, 0, 0, 0, 0, 111, 40)), 0, 1.0)
-    moved = bytes((0xBC, 2, 0, 0, 0, 0, 111, 40))
-    assert not feedback.take(moved, 0, 1.02)
-    assert feedback.take(moved, 0, 1.3)
-    assert feedback.angle == pytest.approx(ticks_to_rad(700))
-
-
 def test_judgement_and_its_log(chain: ServoChain, servos: ScriptedServos) -> None:
     log = HealthLog()
 
@@ -385,11 +358,50 @@ def test_a_joint_that_does_not_follow_stops_the_robot(
 ) -> None:
     chain.arm()
     # Positions of scripted servos stay what they are, whatever their goals.
-    fault = move(chain, 20.0)
+    servos.memory[2][40:42] = (0x400 + 700).to_bytes(2, "little")
+    chain.write([0.5, 0.5, 0.0])
+    doubts = set()
+    fault = ""
+    end = time.monotonic() + 20.0
+    while not fault and time.monotonic() < end:
+        chain.write([0.5, 0.5, 0.0])
+        read(chain, 0.015)
+        fault = chain.fault()
+        doubts.add(judge(chain.readings()[1], THRESHOLDS, math.nan).text)
     assert fault == (
-        "told to move and not seen moving (blocked, or its sensor is stuck): "
-        "joint_1 (servo id 1), joint_2 (servo id 2)"
+        "told to move and not seen moving: joint_1 (servo id 1) (its position does not change: "
+        "sensor stuck, or no drive?), joint_2 (servo id 2) (blocked? load 68 %)"
     )
+    assert "does not follow: blocked? load 68 %" in doubts
+    chain.write(None)
+    chain.write(None)
+    assert chain.readings()[1].doubt == ""
+
+
+def test_what_a_joint_can_reach_is_what_both_allow(servos: ScriptedServos) -> None:
+    servos.memory[2][6:10] = bytes((*(300).to_bytes(2, "little"), *(800).to_bytes(2, "little")))
+    bus = Bus(SerialPort(servos.path, 1000000, reply_timeout_s=0.02), retries=1)
+    chain = ServoChain(bus, JOINTS, handshake(bus, JOINTS, (12,)).servos, MOTION, time.monotonic)
+    one, two, three = chain.ranges
+    assert one == pytest.approx((-2.6, 2.6), abs=RAD_PER_TICK)
+    # Joint 2 is mounted the other way round.
+    assert two == pytest.approx((-288 * RAD_PER_TICK, 212 * RAD_PER_TICK))
+    assert three == (-math.inf, math.inf)
+    bus.close()
+
+
+def test_settings_are_looked_at_even_if_reading_takes_all_the_time(
+    chain: ServoChain, servos: ScriptedServos
+) -> None:
+    chain.arm()
+    servos.memory[2][34:36] = bytes(2)
+
+    def found() -> str:
+        chain.read(time.monotonic())
+        return chain.fault()
+
+    wait_for(found, 10.0, "the torque limit of 0")
+    assert chain.fault().startswith("joint_2 (servo id 2): torque limit is 0")
 
 
 def test_a_servo_that_holds_its_torque_back_is_judged_so(

@@ -15,7 +15,7 @@ from snake_control.ax12.port import SerialPort
 from snake_control.ax12.startup import cycle_duration, handshake
 from snake_control.ax12.units import RAD_PER_TICK, ticks_to_rad
 from snake_control.errors import ServoError
-from support.scripted_servos import SYNC_WRITE, WRITE, ScriptedServos, packet
+from support.scripted_servos import READ, SYNC_WRITE, WRITE, ScriptedServos, packet
 
 MODELS = (12, 18, 300)
 
@@ -298,3 +298,53 @@ def test_settings_that_are_no_error_are_warned_of(
     joints = (JOINTS[0], joint(2, torque_limit=0.8), JOINTS[2])
     (warning,) = handshake(bus, joints, MODELS).warnings
     assert warning.startswith(f"joint_2 (servo id 2): {text}")
+
+
+def moving(servos: ScriptedServos, servo_id: int, by: int, times: int) -> None:
+    """Let a free joint move on at each of its first looks at its position."""
+
+    def answer(instruction: bytes, answer: bytes) -> bytes:
+        nonlocal times
+        if instruction[2] == servo_id and instruction[4] == READ and instruction[5] == 36 and times:
+            times -= 1
+            position = int.from_bytes(servos.memory[servo_id][36:38], "little") + by
+            stand_at(servos, servo_id, position)
+            return packet(servo_id, 4, 0, *position.to_bytes(2, "little"))
+        return answer
+
+    servos.answer = answer
+
+
+def test_a_joint_that_sank_meanwhile_is_held_where_it_is_by_then(
+    bus: Bus, servos: ScriptedServos
+) -> None:
+    moving(servos, 2, -50, 1)
+    assert armed(bus) == (512, 462, 512)
+    assert int.from_bytes(servos.memory[2][30:32], "little") == 462
+    writes = [w for w in servos.instructions(WRITE) if w[2] == 2]
+    assert [w[5] for w in writes[-2:]] == [30, 24], "goal, then torque"
+
+
+def test_a_joint_that_does_not_stand_still_gets_no_torque(bus: Bus, servos: ScriptedServos) -> None:
+    moving(servos, 2, 40, 99)
+    with pytest.raises(ServoError, match=r"joint_2 .*no torque: it does not stand still"):
+        armed(bus)
+    assert bus.ping(1) is not None
+    assert [memory[24] for memory in servos.memory.values()] == [0, 0, 0]
+
+
+def test_servos_that_take_a_goal_for_torque_lose_it_when_another_fails(
+    bus: Bus, servos: ScriptedServos
+) -> None:
+    def answer(instruction: bytes, answer: bytes) -> bytes:
+        if instruction[2] == 1 and instruction[4] == WRITE:
+            servos.memory[1][24] = 1
+        return b"" if instruction[2] == 3 and instruction[4] == READ else answer
+
+    joints, infos = JOINTS, handshake(bus, JOINTS, MODELS).servos
+    servos.memory[2][24] = 1
+    servos.answer = answer
+    with pytest.raises(ServoError, match=r"joint_3 .*does not answer"):
+        arm(bus, joints, infos)
+    assert bus.ping(1) is not None
+    assert [memory[24] for memory in servos.memory.values()] == [0, 1, 0]

@@ -68,6 +68,20 @@ def test_a_lost_servo_is_asked_rarely_and_costs_the_others_no_turn():
 
 
 def test_settings_are_looked_at_in_turn_and_not_of_the_lost():
-    schedule = TelemetrySchedule(4, 0.02)
-    assert [schedule.next_check(frozenset({2})) for _ in range(6)] == [1, 3, 0, 1, 3, 0]
-    assert schedule.next_check(frozenset(range(4))) is None
+    schedule = TelemetrySchedule(4, 0.02, check_period=0.15625)
+    looks = [schedule.check(frozenset({2}), 0.03125 * k, spare=True) for k in range(31)]
+    assert [(k, i) for k, i in enumerate(looks) if i is not None] == [
+        (5, 1),
+        (10, 3),
+        (15, 0),
+        (20, 1),
+        (25, 3),
+        (30, 0),
+    ]
+    assert schedule.check(frozenset(range(4)), 9.0, spare=True) is None
+
+
+def test_settings_are_looked_at_also_where_reads_leave_no_time():
+    schedule = TelemetrySchedule(4, 0.02, check_period=0.1)
+    looks = [schedule.check(NOBODY, 0.02 * k, spare=False) for k in range(41)]
+    assert [(k, i) for k, i in enumerate(looks) if i is not None] == [(13, 1), (26, 2), (39, 3)]
