@@ -24,6 +24,7 @@ from snake_control.ax12.eeprom import ServoInfo, effective_range
 from snake_control.ax12.feedback import Feedback
 from snake_control.ax12.following import FollowWatch
 from snake_control.ax12.joint import WHEEL_MODE, JointSetup
+from snake_control.ax12.modulation import GoalAndSpeed, Present, VelocityLimits
 from snake_control.ax12.telemetry import Request, TelemetrySchedule
 from snake_control.ax12.units import (
     JOINT_NO_LOAD_RAD_S,
@@ -34,13 +35,7 @@ from snake_control.ax12.units import (
     error_names,
     ticks_to_rad,
 )
-from snake_control.ax12.velocity import (
-    GoalAndSpeed,
-    JointModeVelocity,
-    Present,
-    VelocityLimits,
-    WheelModeVelocity,
-)
+from snake_control.ax12.velocity import JointModeVelocity, WheelModeVelocity
 from snake_control.errors import ServoError
 
 _ALARMS_IN_ROW = 2

@@ -35,13 +35,11 @@ All angles are servo angles (counter-clockwise from the centre).
 
 from __future__ import annotations
 
-import dataclasses
 import math
-from typing import NamedTuple
 
+from snake_control.ax12.modulation import GoalAndSpeed, Present, Ramp, SigmaDelta, VelocityLimits
 from snake_control.ax12.units import (
     MAX_RAW,
-    MAX_TICKS,
     RAD_PER_TICK,
     RAD_S_PER_SPEED_UNIT,
     encode_signed,
@@ -59,99 +57,6 @@ _STALE_S, _STALE_PERIODS = 0.1, 2.5
 _BAND_TICKS = 2.0
 
 
-class Present(NamedTuple):
-    """A measured angle [rad], its rate [rad/s] and age [s]."""
-
-    angle: float
-    rate: float
-    age: float
-
-    def after(self, longest: float, fastest: float) -> float:
-        """The angle extrapolated to the present time, by a limited time and speed only."""
-        return self.angle + min(max(self.rate, -fastest), fastest) * min(self.age, longest)
-
-
-class GoalAndSpeed(NamedTuple):
-    """Register values of one cycle; no goal in wheel mode."""
-
-    goal_ticks: int | None
-    speed_raw: int
-
-
-@dataclasses.dataclass(frozen=True)
-class VelocityLimits:
-    """What bounds one servo's motion.
-
-    Attributes:
-        lower_ticks, upper_ticks: range of goals (joint mode).
-        speed: largest speed [rad/s].
-        acceleration: largest change of the commanded speed [rad/s^2], 0 for none.
-        period: nominal time between two cycles [s].
-        look_ahead: how far the goal is ahead of the joint, as time at its speed [s].
-        compliance_ticks: margin + slope, in which the servo does not move at its speed.
-        goal_ticks: first and last goal that the servo accepts; it refuses others, and goes on to
-            the goal it had (joint mode).
-    """
-
-    lower_ticks: int
-    upper_ticks: int
-    speed: float
-    acceleration: float
-    period: float
-    look_ahead: float
-    compliance_ticks: int
-    goal_ticks: tuple[int, int] = (0, MAX_TICKS)
-
-
-class _SigmaDelta:
-    """Whole numbers of units whose average over time is the velocity."""
-
-    def __init__(self, unit: float, period: float) -> None:
-        self._unit = unit
-        self._period = period
-        self._missing = 0.0  # [units * s]
-        self._wanted = 0.0
-        self._sent = 0
-
-    def reset(self) -> None:
-        self._missing = self._wanted = 0.0
-        self._sent = 0
-
-    def elapse(self, dt: float) -> float:
-        """Account for the time since the last number was sent; return the way it made [rad]."""
-        self._missing += (self._wanted - self._sent) * dt
-        self._missing = min(max(self._missing, -self._period), self._period)
-        return self._sent * self._unit * dt
-
-    def next(self, velocity: float) -> int:
-        if velocity == 0.0:
-            self.reset()
-            return 0
-        self._wanted = velocity / self._unit
-        number = round(self._wanted + self._missing / self._period)
-        # Never against the wanted direction, whatever was missing before.
-        number = max(number, 0) if velocity > 0 else min(number, 0)
-        self._sent = min(max(number, -MAX_RAW), MAX_RAW)
-        return self._sent
-
-
-class _Ramp:
-    """Limits speed, and the change of speed if configured."""
-
-    def __init__(self, limits: VelocityLimits) -> None:
-        self._limits = limits
-        self.velocity = 0.0
-
-    def step(self, velocity: float, dt: float) -> float:
-        speed, acceleration = self._limits.speed, self._limits.acceleration
-        velocity = min(max(velocity, -speed), speed)
-        if acceleration > 0.0:
-            change = acceleration * dt
-            velocity = min(max(velocity, self.velocity - change), self.velocity + change)
-        self.velocity = velocity
-        return velocity
-
-
 class JointModeVelocity:
     """Velocity of one servo in joint mode.
 
@@ -163,8 +68,8 @@ class JointModeVelocity:
     def __init__(self, limits: VelocityLimits) -> None:
         self.setpoint = 0.0
         self._limits = limits
-        self._ramp = _Ramp(limits)
-        self._units = _SigmaDelta(RAD_S_PER_SPEED_UNIT, limits.period)
+        self._ramp = Ramp(limits)
+        self._units = SigmaDelta(RAD_S_PER_SPEED_UNIT, limits.period)
         self._compliance = limits.compliance_ticks * RAD_PER_TICK
         self._lower = ticks_to_rad(limits.lower_ticks)
         self._upper = ticks_to_rad(limits.upper_ticks)
@@ -204,11 +109,11 @@ class JointModeVelocity:
         stale = not present.age <= self._oldest
         if stale:
             velocity = self._ramp.velocity = 0.0
-        at_end = self._is_outwards(velocity, present)
-        if at_end:
-            # x_s stays at the end: pulled back to the joint, it would set off again at once.
+        # x_s stays at the end: pulled back to the joint, it would set off again at once.
+        stays = self._is_outwards(velocity, self.setpoint)
+        if stays or self._is_outwards(velocity, present.angle):
             velocity = self._ramp.velocity = 0.0
-        else:
+        if not stays:
             self._limit_lead(velocity, dt, present, stale)
         self.velocity = velocity
         self._at_rest = self._at_rest + dt if velocity == 0.0 else 0.0
@@ -232,10 +137,8 @@ class JointModeVelocity:
         elif way < 0:
             self.setpoint = max(self.setpoint + way, min(self._lower, self.setpoint))
 
-    def _is_outwards(self, velocity: float, present: Present) -> bool:
-        return (velocity > 0 and max(self.setpoint, present.angle) >= self._upper) or (
-            velocity < 0 and min(self.setpoint, present.angle) <= self._lower
-        )
+    def _is_outwards(self, velocity: float, angle: float) -> bool:
+        return (velocity > 0 and angle >= self._upper) or (velocity < 0 and angle <= self._lower)
 
     def _limit_lead(self, velocity: float, dt: float, present: Present, stale: bool) -> None:
         here = present.after(self._oldest, abs(self.velocity) + RAD_S_PER_SPEED_UNIT)
@@ -254,7 +157,12 @@ class JointModeVelocity:
             low = -high
         else:
             return
-        self.setpoint = here + min(max(lead, low), high)
+        setpoint = here + min(max(lead, low), high)
+        # Extrapolation must not carry it out of the range; only where the joint was found may be.
+        outermost = min(self._lower, self.setpoint, present.angle)
+        setpoint = max(setpoint, outermost)
+        outermost = max(self._upper, self.setpoint, present.angle)
+        self.setpoint = min(setpoint, outermost)
 
     def _hold(self) -> GoalAndSpeed:
         return self._send(self.setpoint)
@@ -276,9 +184,9 @@ class WheelModeVelocity:
 
     def __init__(self, limits: VelocityLimits, no_load_speed: float) -> None:
         self.velocity = 0.0
-        self._ramp = _Ramp(limits)
+        self._ramp = Ramp(limits)
         self._longest = limits.look_ahead
-        self._units = _SigmaDelta(no_load_speed / MAX_RAW, limits.period)
+        self._units = SigmaDelta(no_load_speed / MAX_RAW, limits.period)
 
     def latch(self, angle: float) -> GoalAndSpeed:
         """Start at rest; there is no position to hold."""

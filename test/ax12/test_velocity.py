@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from snake_control.ax12.modulation import GoalAndSpeed, Present, VelocityLimits
 from snake_control.ax12.units import (
     RAD_PER_TICK,
     RAD_S_PER_SPEED_UNIT,
@@ -17,14 +18,7 @@ from snake_control.ax12.units import (
     rad_to_ticks,
     ticks_to_rad,
 )
-from snake_control.ax12.velocity import (
-    SEED_SPEED_RAW,
-    GoalAndSpeed,
-    JointModeVelocity,
-    Present,
-    VelocityLimits,
-    WheelModeVelocity,
-)
+from snake_control.ax12.velocity import SEED_SPEED_RAW, JointModeVelocity, WheelModeVelocity
 from support.servo_model import ServoModel
 
 PERIOD = 0.02

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import math
 
+from snake_control.ax12.modulation import GoalAndSpeed, Present
 from snake_control.ax12.units import RAD_PER_TICK, RAD_S_PER_SPEED_UNIT, ticks_to_rad
-from snake_control.ax12.velocity import GoalAndSpeed, Present
 
 NO_LOAD_RAD_S = 6.0
 STEPS_PER_CYCLE = 10
