@@ -6,6 +6,7 @@ from snake_control.ax12.units import RAD_PER_TICK, RAD_S_PER_SPEED_UNIT
 
 _SHARE = 0.1
 _LEAST_RAD = 8 * RAD_PER_TICK
+_LEAST_CREEPING_RAD = 40 * RAD_PER_TICK
 _CREEPING = 5 * RAD_S_PER_SPEED_UNIT
 _HIGH_LOAD = 0.5
 
@@ -15,8 +16,8 @@ class FollowWatch:
 
     Way is judged over windows of half the time; a reversal or a rest begins a new one. A window
     with less than a tenth of the way is a doubt, a second one in a row a failure. Too little way
-    to be told from the steps of the sensor (8 positions) says nothing. At speeds so low that a
-    servo may stay where it is (below 5 units of Moving Speed) only one that pushes is judged.
+    to be told from the steps of the sensor (8 positions) says nothing. Below 5 units of Moving
+    Speed a servo may hesitate: there 40 positions are waited for, unless it pushes.
 
     Attributes:
         doubt: what seems to be wrong, empty if nothing.
@@ -42,7 +43,7 @@ class FollowWatch:
     def _begin(self, angle: float) -> None:
         self._begun_at = angle
         self._elapsed = self._wanted = 0.0
-        self._pushes = self._fast = self._frozen = True
+        self._pushes = self._frozen = True
 
     def step(self, velocity: float, dt: float, angle: float, load: float) -> None:
         """Account for a cycle.
@@ -64,12 +65,13 @@ class FollowWatch:
         self._elapsed += dt
         self._wanted += abs(velocity) * dt
         self._pushes = self._pushes and abs(load) >= _HIGH_LOAD
-        self._fast = self._fast and abs(velocity) >= _CREEPING
         self._frozen = self._frozen and angle == self._begun_at
-        if self._elapsed < self._window or self._wanted < _LEAST_RAD:
+        fast = self._wanted >= _CREEPING * self._elapsed
+        least = _LEAST_RAD if fast or self._pushes else _LEAST_CREEPING_RAD
+        if self._elapsed < self._window or self._wanted < least:
             return
         made = direction * (angle - self._begun_at)
-        follows = made >= _SHARE * self._wanted or not (self._fast or self._pushes)
+        follows = made >= _SHARE * self._wanted
         self.failed = not follows and self.doubt != ""
         self.doubt = "" if follows else self._why(load)
         self._begin(angle)

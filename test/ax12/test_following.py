@@ -43,9 +43,15 @@ def test_one_that_pushes_is_called_blocked(v):
     assert at == pytest.approx(max(1.0, 16 * RAD_PER_TICK / abs(v)), abs=0.1)
 
 
-@pytest.mark.parametrize("v", [0.01, 0.04])
-def test_a_creeping_joint_that_does_not_push_may_stay_where_it_is(v):
-    assert watched(lambda _: v, lambda _: 0.0, 30.0, load=0.2) is None
+@pytest.mark.parametrize("v", [0.01, -0.04])
+def test_a_creeping_joint_that_does_not_push_has_more_time(v):
+    at, doubt = watched(lambda _: v, lambda _: 0.0, 60.0, load=0.2)
+    assert at == pytest.approx(80 * RAD_PER_TICK / abs(v), abs=0.1)
+    assert "does not change" in doubt
+
+
+def test_a_creeping_joint_may_hesitate():
+    assert watched(lambda _: 0.02, lambda t: 0.02 if t % 12.0 > 8.0 else 0.0, 60.0) is None
 
 
 def test_a_joint_that_goes_the_wrong_way_is_given_up():
