@@ -44,6 +44,7 @@ FEEDBACK_LOST_S = 0.5
 """Without a believable reading of a driven joint for so long the robot must stop."""
 
 _ASKED_IN_VAIN = 2
+_RETRY_SHARE = 0.25
 
 SLOW_STALE_S = 3.0
 """Voltage and temperature that were not read for so long are not known any more."""
@@ -169,7 +170,7 @@ class ServoChain:
         self._lost_after = motion.lost_after_misses
         self._armed = False
         self._written_at = -math.inf
-        self._look_ahead = motion.look_ahead
+        self._period, self._look_ahead = motion.period, motion.look_ahead
         self._telemetry = TelemetrySchedule(len(self._servos), motion.period, motion.slow_period)
         self._finding = ""
 
@@ -372,9 +373,10 @@ class ServoChain:
     def _read_one(self, servo: _Servo, request: Request, until: float) -> bool:
         """Read a servo; return whether it answered."""
         begin = self._clock()
-        # A servo that missed before gets one try: time for retries belongs to the others.
+        # A servo that missed before gets one try: time for retries belongs to the others. So does
+        # one at the end of the time: a retry would delay the next cycle's goals.
         missed = self._counters(servo).misses_in_row > 0
-        retries = 0 if missed or begin >= until else None
+        retries = 0 if missed or begin >= until - _RETRY_SHARE * self._period else None
         reply = self._bus.read(
             servo.joint.servo_id, ct.PRESENT_POSITION.address, request.length, retries
         )

@@ -22,7 +22,7 @@ LENGTH = ct.ALARM_SHUTDOWN.end
 """Bytes from address 0 on that are looked at."""
 
 _ALL_REPLIES = 2
-_HOT_C = 85
+_FACTORY_C = (70, 75, 85)
 _NOMINAL_V = 11.1
 _PROTECTION = ERROR_OVERHEATING | ERROR_OVERLOAD
 
@@ -35,11 +35,13 @@ class Finding:
         text: what it is and what to do.
         error: whether the robot must not be driven so; else it is worth a warning.
         joint: whose servo it is about, ``None`` for the whole bus.
+        advice: whether it works as it is, and could work better.
     """
 
     text: str
     error: bool
     joint: JointSetup | None = None
+    advice: bool = False
 
     def __str__(self) -> str:
         return self.text if self.joint is None else f"{self.joint}: {self.text}"
@@ -148,10 +150,10 @@ def _warnings(joint: JointSetup, block: bytes) -> list[str]:
             f"{register_name(ct.MAX_VOLTAGE_LIMIT)}"
         )
     hottest = ct.TEMPERATURE_LIMIT.decode(block, 0)
-    if hottest > _HOT_C:
+    if hottest not in _FACTORY_C:
         found.append(
-            f"{register_name(ct.TEMPERATURE_LIMIT)} is {hottest} degC, which it does not survive "
-            "for long; 70 is the factory's"
+            f"{register_name(ct.TEMPERATURE_LIMIT)} is {hottest} degC, none that comes from the "
+            "factory (70; AX-18A 75; AX-12 of 2006 85): the manual says not to change it"
         )
     return found
 

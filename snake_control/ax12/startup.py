@@ -18,6 +18,8 @@ from snake_control.errors import ServoError
 
 _STATUS_BYTES = 14
 _BITS_PER_BYTE = 10
+_RETURN_DELAY_UNIT_S = 2e-6
+_LONG_DELAYS_S = 1e-3
 
 
 @dataclasses.dataclass(frozen=True)
@@ -36,7 +38,10 @@ class Inspection:
 
 @dataclasses.dataclass(frozen=True)
 class Handshake:
-    """Result of a successful handshake: one info per joint, and what is worth a warning."""
+    """Result of a successful handshake: one info per joint, and what is worth a warning.
+
+    Advice is left to those who ask for it with ``inspect``.
+    """
 
     servos: tuple[ServoInfo, ...]
     warnings: tuple[str, ...]
@@ -60,7 +65,8 @@ def handshake(
         for joint, block in zip(joints, found.blocks, strict=True)
         if block is not None
     )
-    return Handshake(servos, tuple(map(str, found.findings)))
+    warnings = tuple(str(finding) for finding in found.findings if not finding.advice)
+    return Handshake(servos, warnings)
 
 
 def inspect(bus: Bus, joints: Sequence[JointSetup], accepted_models: Collection[int]) -> Inspection:
@@ -93,7 +99,23 @@ def inspect(bus: Bus, joints: Sequence[JointSetup], accepted_models: Collection[
                 True,
             )
         )
+    findings += _on_return_delays(blocks)
     return Inspection(tuple(blocks), tuple(findings))
+
+
+def _on_return_delays(blocks: Sequence[bytes | None]) -> list[Finding]:
+    delays = [
+        _RETURN_DELAY_UNIT_S * ct.RETURN_DELAY_TIME.decode(block, 0)
+        for block in blocks
+        if block is not None
+    ]
+    if sum(delays) <= _LONG_DELAYS_S:
+        return []
+    text = (
+        f"the servos wait {1e3 * sum(delays):.1f} ms in each cycle before they reply: set "
+        f"{eeprom.register_name(ct.RETURN_DELAY_TIME)} to 0, if the adapter is quick enough"
+    )
+    return [Finding(text, False, advice=True)]
 
 
 def cycle_duration(servos: Sequence[ServoInfo], baud_rate: int) -> float:

@@ -12,7 +12,7 @@ from snake_control.ax12.bus import Bus
 from snake_control.ax12.eeprom import ServoInfo
 from snake_control.ax12.joint import JointSetup
 from snake_control.ax12.port import SerialPort
-from snake_control.ax12.startup import cycle_duration, handshake
+from snake_control.ax12.startup import cycle_duration, handshake, inspect
 from snake_control.ax12.units import RAD_PER_TICK, ticks_to_rad
 from snake_control.errors import ServoError
 from support.scripted_servos import READ, SYNC_WRITE, WRITE, ScriptedServos, packet
@@ -287,6 +287,7 @@ def test_a_servo_that_lost_its_settings_is_found(
     [
         (18, 4, "does not shut down by itself at: overload; set Alarm Shutdown (address 18) to 36"),
         (11, 99, "Temperature Limit (address 11) is 99 degC"),
+        (11, 40, "Temperature Limit (address 11) is 40 degC"),
         (12, 120, "its voltage limits 12.0 to 14.0 V do not hold the 11.1 V"),
         (15, 1, "Max Torque (address 14) allows 50 % of its torque, less than the 80 % configured"),
     ],
@@ -348,3 +349,13 @@ def test_servos_that_take_a_goal_for_torque_lose_it_when_another_fails(
         arm(bus, joints, infos)
     assert bus.ping(1) is not None
     assert [memory[24] for memory in servos.memory.values()] == [0, 1, 0]
+
+
+def test_long_return_delays_are_advice_and_no_warning(bus: Bus, servos: ScriptedServos) -> None:
+    (found,) = inspect(bus, JOINTS, MODELS).findings
+    assert (found.error, found.advice, found.joint) == (False, True, None)
+    assert str(found).startswith("the servos wait 1.5 ms in each cycle")
+    assert "Return Delay Time (address 5) to 0" in found.text
+    for memory in servos.memory.values():
+        memory[5] = 0
+    assert inspect(bus, JOINTS, MODELS).findings == ()
