@@ -31,6 +31,7 @@ setup(
         "console_scripts": [
             *(f"{node} = {NAME}.nodes.{node}:main" for node in NODES),
             *(f"{command} = {NAME}.cli.{command}:main" for command in COMMANDS),
+            f"ax12 = {NAME}.cli.ax12.__main__:main",
         ],
     },
 )

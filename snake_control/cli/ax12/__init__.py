@@ -1,0 +1,1 @@
+"""The bring-up tool: ``ros2 run snake_control ax12``."""
