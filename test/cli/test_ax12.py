@@ -12,7 +12,6 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from mock.test_command_line import ROOT, Mock
 
 from snake_control.cli.ax12.__main__ import main
 from snake_control.mock.bus import Bus as MockBus
@@ -21,6 +20,7 @@ from snake_control.mock.server import Server
 from snake_control.mock.servo import Servo
 from snake_control.mock.simulation import Simulation
 from support.graph import CONFIG
+from support.mock_process import ROOT, Mock
 
 PAPER = str(CONFIG / "paper_robot.yaml")
 

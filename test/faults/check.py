@@ -8,9 +8,9 @@ import re
 from collections.abc import Sequence
 
 import numpy as np
-from faults.scenario import Expect, Scenario
 from numpy.typing import NDArray
 
+from faults.scenario import Expect, Scenario
 from snake_control.ax12.chain import FEEDBACK_LOST_S
 from snake_control.config import Config
 

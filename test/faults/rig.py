@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from faults.check import Outcome, Record, judge
-from faults.scenario import After, Expect, Scenario
 from snake_interfaces.msg import BusState
 
+from faults.check import Outcome, Record, judge
+from faults.scenario import After, Expect, Scenario
 from snake_control.config import Config, load
 from snake_control.nodes import topics
 from snake_control.nodes.recorder import FOLLOWING

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from faults.check import Record, judge, look_ahead_bound, timeouts
 from faults.scenario import Expect, Scenario, load
-
 from snake_control.config import load as load_config
 from snake_control.mock.fault_kinds import KINDS
 from support.graph import CONFIG

@@ -5,7 +5,6 @@ from __future__ import annotations
 import random
 
 from fuzz.generate import frames, mutated
-
 from snake_control.ax12.bus import Bus
 from snake_control.errors import BusError, ServoError
 from snake_control.mock.servo import Servo

@@ -5,7 +5,6 @@ from __future__ import annotations
 import random
 
 from fuzz.generate import anything, frames
-
 from snake_control.mock.bus import Bus
 from snake_control.mock.control_table import BY_NAME, TABLE
 from snake_control.mock.servo import Servo

@@ -8,13 +8,13 @@ from pathlib import Path
 
 import pytest
 import serial
+
 from fuzz.driver import DriverFuzz
 from fuzz.generate import anything, frames, mutated
 from fuzz.mock import MockFuzz
-from mock.test_command_line import Mock
-
 from snake_control.ax12.bus import Bus
 from snake_control.ax12.port import SerialPort
+from support.mock_process import Mock
 from support.scripted_servos import ScriptedServos
 
 

@@ -4,36 +4,16 @@ import argparse
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import dynamixel_sdk as sdk
 import pytest
 
 from snake_control.mock.__main__ import baud_register, ids
+from support.mock_process import ROOT, Mock
 from support.waiting import wait_for
 
-ROOT = Path(__file__).resolve().parents[2]
 # On a busy machine the SDK may give up a reply that is just coming.
 ATTEMPTS = 5
-
-
-class Mock:
-    def __init__(self, link: Path, *arguments: str) -> None:
-        self.link = link
-        self.process = subprocess.Popen(
-            [sys.executable, "-m", "snake_control.mock", "--port-link", str(link), *arguments],
-            cwd=ROOT,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-        )
-        wait_for(lambda: link.is_symlink() or self.process.poll() is not None, 30.0, "the link")
-        assert self.process.poll() is None, self.process.communicate()[0]
-
-    def stop(self) -> int:
-        self.process.terminate()
-        self.process.communicate(timeout=10.0)
-        return self.process.returncode
 
 
 @pytest.fixture

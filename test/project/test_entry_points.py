@@ -11,7 +11,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 NODES = {"bus_driver", "pose_input", "scp_controller", "trajectory_generator", "mock_bus"}
-COMMANDS = {"demo", "evaluate", "experiment", "scp_study"}
+COMMANDS = {"ax12", "demo", "evaluate", "experiment", "scp_study"}
 
 
 def _console_scripts() -> dict[str, str]:
