@@ -7,7 +7,6 @@ that servos that do not answer cannot keep the others from their commands.
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Callable, Sequence
 
@@ -20,132 +19,13 @@ from snake_control.ax12.arming import (
     require_off,
 )
 from snake_control.ax12.bus import Bus, Counters
+from snake_control.ax12.driven_joint import FEEDBACK_LOST_S, DrivenJoint, JointReading, Motion
 from snake_control.ax12.eeprom import ServoInfo, effective_range
-from snake_control.ax12.feedback import Feedback
-from snake_control.ax12.following import FollowWatch
-from snake_control.ax12.joint import WHEEL_MODE, JointSetup
-from snake_control.ax12.modulation import GoalAndSpeed, Present, VelocityLimits
+from snake_control.ax12.joint import JointSetup
 from snake_control.ax12.telemetry import Request, TelemetrySchedule
-from snake_control.ax12.units import (
-    JOINT_NO_LOAD_RAD_S,
-    MAX_RAW,
-    RAD_S_PER_SPEED_UNIT,
-    WHEEL_NO_LOAD_RAD_S,
-    decode_signed,
-    error_names,
-    ticks_to_rad,
-)
-from snake_control.ax12.velocity import JointModeVelocity, WheelModeVelocity
 from snake_control.errors import ServoError
 
-_ALARMS_IN_ROW = 2
-
-FEEDBACK_LOST_S = 0.5
-"""Without a believable reading of a driven joint for so long the robot must stop."""
-
-_ASKED_IN_VAIN = 2
 _RETRY_SHARE = 0.25
-
-SLOW_STALE_S = 3.0
-"""Voltage and temperature that were not read for so long are not known any more."""
-
-
-@dataclasses.dataclass(frozen=True)
-class Motion:
-    """How all joints move.
-
-    Attributes:
-        period: nominal time between two cycles [s].
-        look_ahead: see ``VelocityLimits``.
-        acceleration: see ``VelocityLimits``.
-        lost_after_misses: missed reads in a row after which a servo counts as lost.
-        follow_time: how long a joint may not do what it is told [s] (see ``FollowWatch``).
-        slow_period: within which voltage and temperature of each servo are read [s]; with
-            ``period`` or less all of it is read in each cycle.
-    """
-
-    period: float
-    look_ahead: float
-    acceleration: float
-    lost_after_misses: int
-    follow_time: float = 1.0
-    slow_period: float = 0.5
-
-
-@dataclasses.dataclass(frozen=True)
-class JointReading:
-    """One joint as last seen, in the joint frame (SI units).
-
-    Attributes:
-        angle, rate, load: NaN before the first reply; load is a fraction of the maximum output.
-        voltage, temperature: [V], [degC]; NaN when not read for ``SLOW_STALE_S``.
-        age: of the reading [s], infinite before the first.
-        error_bits: of the last reply.
-        online: False once the servo counts as lost.
-        torque_on: Torque Enable as last read or acknowledged.
-        counters: what became of the reads so far.
-        invalid_values: replies that were not believed.
-        shut_down: whether it holds its torque back after an alarm (Torque Limit 0), as last read.
-        error_rate: share of the last requests without a good reply at the first try, 0 to 1.
-        goal: Goal Position last sent or rehearsed [rad]; NaN before, and in wheel mode.
-        goal_speed: Moving Speed with it [rad/s]; in wheel mode with the sign of the output.
-        doubt: why it may not go where it is told; empty if it does.
-    """
-
-    joint: JointSetup
-    angle: float
-    rate: float
-    load: float
-    voltage: float
-    temperature: float
-    age: float
-    error_bits: int
-    online: bool
-    torque_on: bool
-    counters: Counters
-    invalid_values: int
-    shut_down: bool
-    error_rate: float
-    goal: float
-    goal_speed: float
-    doubt: str
-
-
-class _Servo:
-    def __init__(self, joint: JointSetup, info: ServoInfo, motion: Motion) -> None:
-        self.joint = joint
-        self.info = info
-        limits = VelocityLimits(
-            lower_ticks=info.lower_ticks,
-            upper_ticks=info.upper_ticks,
-            speed=joint.speed_limit,
-            acceleration=motion.acceleration,
-            period=motion.period,
-            look_ahead=motion.look_ahead,
-            compliance_ticks=joint.compliance_ticks,
-            goal_ticks=info.angle_limits_ticks,
-        )
-        self.wheel = joint.mode == WHEEL_MODE
-        fastest = WHEEL_NO_LOAD_RAD_S if self.wheel else JOINT_NO_LOAD_RAD_S
-        no_load = fastest.get(info.model, fastest[12])
-        self.control: JointModeVelocity | WheelModeVelocity
-        if self.wheel:
-            self.control = WheelModeVelocity(limits, no_load)
-        else:
-            self.control = JointModeVelocity(limits)
-        self.feedback = Feedback(no_load, self.wheel, motion.period)
-        self.following = FollowWatch(motion.follow_time)
-        self.speed_unit = no_load / MAX_RAW if self.wheel else RAD_S_PER_SPEED_UNIT
-        self.torque_on = False
-        self.shut_down = False
-        self.heard_at = -math.inf  # last reply to go by
-        self.asked_in_vain = 0
-        self.alarms_in_row = 0
-        self.sent: GoalAndSpeed | None = None
-
-    def present(self, now: float) -> Present:
-        feedback = self.feedback
-        return Present(feedback.angle, feedback.rate, now - feedback.read_at)
 
 
 class ServoChain:
@@ -165,12 +45,12 @@ class ServoChain:
             clock: monotonic time [s]; readings are stamped with it.
         """
         self._bus = bus
-        self._servos = [_Servo(j, i, motion) for j, i in zip(joints, servos, strict=True)]
+        self._servos = [DrivenJoint(j, i, motion) for j, i in zip(joints, servos, strict=True)]
         self._clock = clock
         self._lost_after = motion.lost_after_misses
         self._armed = False
         self._written_at = -math.inf
-        self._period, self._look_ahead = motion.period, motion.look_ahead
+        self._period = motion.period
         self._telemetry = TelemetrySchedule(len(self._servos), motion.period, motion.slow_period)
         self._finding = ""
 
@@ -222,12 +102,7 @@ class ServoChain:
         self._finding = ""
         self._written_at = self._clock()
         for servo, seed in zip(self._servos, seeds, strict=True):
-            servo.sent = servo.control.latch(seed.angle)
-            servo.torque_on, servo.shut_down = True, False
-            servo.following.reset()
-            servo.heard_at = self._written_at
-            servo.asked_in_vain = servo.alarms_in_row = 0
-            servo.feedback.start(None if servo.wheel else seed.measured, self._written_at)
+            servo.armed(seed, self._written_at)
 
     def disarm(self) -> None:
         """Switch torque off: the joints are free.
@@ -261,17 +136,7 @@ class ServoChain:
         goals: dict[int, bytes] = {}
         wheels: dict[int, bytes] = {}
         for i, servo in enumerate(self._servos):
-            present = servo.present(now)
-            if not servo.wheel:
-                # During a pause of this process a joint goes no farther than the look-ahead.
-                led = min(dt, self._look_ahead)
-                velocity, load = servo.control.velocity, servo.feedback.load
-                servo.following.step(velocity, led, present.angle, load)
-            if velocities is None:
-                sent = servo.control.stop(dt, present)
-            else:
-                sent = servo.control.step(servo.joint.direction * velocities[i], dt, present)
-            servo.sent = sent
+            sent = servo.step(None if velocities is None else velocities[i], dt, now)
             speed = ct.MOVING_SPEED.encode(sent.speed_raw)
             if sent.goal_ticks is None:
                 wheels[servo.joint.servo_id] = speed
@@ -291,14 +156,7 @@ class ServoChain:
         dt = now - self._written_at
         self._written_at = now
         for i, servo in enumerate(self._servos):
-            present = servo.present(now)
-            if math.isnan(present.angle):
-                continue
-            velocity = 0.0 if velocities is None else servo.joint.direction * velocities[i]
-            if velocity == 0.0 or servo.sent is None:
-                servo.sent = servo.control.latch(present.angle)
-            else:
-                servo.sent = servo.control.step(velocity, dt, present)
+            servo.rehearse(None if velocities is None else velocities[i], dt, now)
 
     def read(self, until: float) -> None:
         """Read the servos, all of them if they answer in time.
@@ -334,7 +192,10 @@ class ServoChain:
     def readings(self) -> list[JointReading]:
         """Return every joint as last seen."""
         now = self._clock()
-        return [self._reading(servo, now) for servo in self._servos]
+        return [
+            servo.reading(now, self._counters(servo), not self._is_lost(servo))
+            for servo in self._servos
+        ]
 
     def fault(self) -> str:
         """Return why the robot must not go on moving; empty if it may."""
@@ -343,34 +204,21 @@ class ServoChain:
             return f"no reply {self._lost_after} times in a row from " + ", ".join(map(str, lost))
         if not self._armed:
             return ""
-        alarmed = [s for s in self._servos if s.alarms_in_row >= _ALARMS_IN_ROW]
-        if alarmed:
-            return "; ".join(
-                f"{s.joint} shut down: "
-                + ", ".join(error_names(s.feedback.error_bits & s.info.shutdown_bits))
-                for s in alarmed
-            )
+        alarms = [f"{s.joint} shut down: {', '.join(s.alarms)}" for s in self._servos if s.alarms]
+        if alarms:
+            return "; ".join(alarms)
         now = self._clock()
-        # Asked in vain: while this process did not run, nobody could answer.
-        unheard = [
-            servo.joint
-            for servo in self._servos
-            if now - servo.heard_at > FEEDBACK_LOST_S and servo.asked_in_vain >= _ASKED_IN_VAIN
-        ]
+        unheard = [servo.joint for servo in self._servos if servo.unheard(now)]
         if unheard:
             return f"no believable reading for {FEEDBACK_LOST_S:g} s from " + ", ".join(
                 map(str, unheard)
             )
-        stuck = [
-            f"{servo.joint} ({servo.following.doubt})"
-            for servo in self._servos
-            if servo.following.failed
-        ]
+        stuck = [f"{s.joint} ({s.not_following})" for s in self._servos if s.not_following]
         if stuck:
             return "told to move and not seen moving: " + ", ".join(stuck)
         return self._finding
 
-    def _read_one(self, servo: _Servo, request: Request, until: float) -> bool:
+    def _read_one(self, servo: DrivenJoint, request: Request, until: float) -> bool:
         """Read a servo; return whether it answered."""
         begin = self._clock()
         # A servo that missed before gets one try: time for retries belongs to the others. So does
@@ -383,51 +231,11 @@ class ServoChain:
         servo.asked_in_vain += 1
         if reply is None:
             return False
-        now = 0.5 * (begin + self._clock())
-        believed = servo.feedback.take(reply.data, reply.error_bits, now)
-        # A wheel does not move by its readings, and has none in the dead zone of its sensor.
-        if believed or servo.wheel:
-            servo.heard_at = now
-            servo.asked_in_vain = 0
-        alarmed = reply.error_bits & servo.info.shutdown_bits
-        servo.alarms_in_row = servo.alarms_in_row + 1 if alarmed else 0
+        servo.take(reply, 0.5 * (begin + self._clock()))
         return True
 
-    def _counters(self, servo: _Servo) -> Counters:
+    def _counters(self, servo: DrivenJoint) -> Counters:
         return self._bus.counters.get(servo.joint.servo_id) or Counters()
 
-    def _is_lost(self, servo: _Servo) -> bool:
+    def _is_lost(self, servo: DrivenJoint) -> bool:
         return self._counters(servo).misses_in_row >= self._lost_after
-
-    def _reading(self, servo: _Servo, now: float) -> JointReading:
-        joint, feedback, sent = servo.joint, servo.feedback, servo.sent
-        counters = self._counters(servo)
-        goal = goal_speed = math.nan
-        if sent is not None:
-            goal_speed = (
-                decode_signed(sent.speed_raw)
-                * servo.speed_unit
-                * (joint.direction if servo.wheel else 1)
-            )
-            if sent.goal_ticks is not None:
-                goal = joint.to_joint(ticks_to_rad(sent.goal_ticks))
-        slow_known = now - feedback.slow_read_at <= SLOW_STALE_S
-        return JointReading(
-            joint=joint,
-            angle=joint.to_joint(feedback.angle),
-            rate=joint.direction * feedback.rate,
-            load=joint.direction * feedback.load,
-            voltage=feedback.voltage if slow_known else math.nan,
-            temperature=feedback.temperature if slow_known else math.nan,
-            age=now - feedback.read_at,
-            error_bits=feedback.error_bits,
-            online=not self._is_lost(servo),
-            torque_on=servo.torque_on,
-            counters=dataclasses.replace(counters),
-            invalid_values=feedback.invalid_values,
-            shut_down=servo.shut_down,
-            error_rate=counters.error_rate,
-            goal=goal,
-            goal_speed=goal_speed,
-            doubt=servo.following.doubt,
-        )

@@ -7,7 +7,7 @@ import enum
 import math
 from collections.abc import Sequence
 
-from snake_control.ax12.chain import JointReading
+from snake_control.ax12.driven_joint import JointReading
 from snake_control.ax12.units import error_names
 
 

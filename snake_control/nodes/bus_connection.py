@@ -8,7 +8,8 @@ import time
 from collections.abc import Callable, Collection, Sequence
 
 from snake_control.ax12.bus import Bus
-from snake_control.ax12.chain import Motion, ServoChain
+from snake_control.ax12.chain import ServoChain
+from snake_control.ax12.driven_joint import Motion
 from snake_control.ax12.joint import JointSetup
 from snake_control.ax12.port import SerialPort
 from snake_control.ax12.startup import cycle_duration, handshake

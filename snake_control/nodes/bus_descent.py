@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from snake_control.ax12.chain import JointReading
+from snake_control.ax12.driven_joint import JointReading
 from snake_control.ax12.joint import WHEEL_MODE, JointSetup
 from snake_control.ax12.lowering import Lowering, Phase
 from snake_control.config import BusDriverConfig

@@ -11,7 +11,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from sensor_msgs.msg import JointState
 from snake_interfaces.msg import BusState, JointVelocityCommand, ServoState
 
-from snake_control.ax12.chain import JointReading
+from snake_control.ax12.driven_joint import JointReading
 from snake_control.ax12.health import Level, Verdict
 from snake_control.ax12.units import error_names
 from snake_control.nodes.bus_snapshot import Snapshot, State

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import enum
 
-from snake_control.ax12.chain import JointReading
+from snake_control.ax12.driven_joint import JointReading
 
 
 class State(enum.IntEnum):

@@ -10,7 +10,8 @@ from collections.abc import Iterator
 import pytest
 
 from snake_control.ax12.bus import Bus
-from snake_control.ax12.chain import Motion, ServoChain
+from snake_control.ax12.chain import ServoChain
+from snake_control.ax12.driven_joint import Motion
 from snake_control.ax12.health import HealthLog, Level, Thresholds, Verdict, judge
 from snake_control.ax12.joint import JointSetup
 from snake_control.ax12.port import SerialPort

@@ -16,7 +16,8 @@ import numpy as np
 import pytest
 
 from snake_control.ax12.bus import Bus
-from snake_control.ax12.chain import Motion, ServoChain
+from snake_control.ax12.chain import ServoChain
+from snake_control.ax12.driven_joint import Motion
 from snake_control.ax12.joint import JointSetup
 from snake_control.ax12.startup import handshake
 from snake_control.errors import ServoError

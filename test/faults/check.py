@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from faults.scenario import Expect, Scenario
-from snake_control.ax12.chain import FEEDBACK_LOST_S
+from snake_control.ax12.driven_joint import FEEDBACK_LOST_S
 from snake_control.config import Config
 
 Array = NDArray[np.float64]
