@@ -14,10 +14,11 @@ _HIGH_LOAD = 0.5
 class FollowWatch:
     """Compares the way that a joint was told to make with the one that it made.
 
-    Way is judged over windows of half the time; a reversal or a rest begins a new one. A window
-    with less than a tenth of the way is a doubt, a second one in a row a failure. Too little way
-    to be told from the steps of the sensor (8 positions) says nothing. Below 5 units of Moving
-    Speed a servo may hesitate: there 40 positions are waited for, unless it pushes.
+    Way is judged over windows of half the time. A reversal begins anew, and so does a rest as long
+    as the time; a shorter one, as of commands that arrive late, is left out. A window with less
+    than a tenth of the way is a doubt, a second one in a row a failure. Too little way to be told
+    from the steps of the sensor (8 positions) says nothing. Below 5 units of Moving Speed a servo
+    may hesitate: there 40 positions are waited for, unless it pushes.
 
     Attributes:
         doubt: what seems to be wrong, empty if nothing.
@@ -36,6 +37,7 @@ class FollowWatch:
     def reset(self) -> None:
         """Forget everything."""
         self._direction = 0
+        self._rested = 0.0
         self.doubt = ""
         self.failed = False
         self._begin(0.0)
@@ -55,12 +57,16 @@ class FollowWatch:
             load: its load as fraction of the maximum output.
         """
         direction = (velocity > 0.0) - (velocity < 0.0)
+        if direction == 0:
+            self._rested += dt
+            if self._rested >= 2.0 * self._window:
+                self.reset()
+            return
+        self._rested = 0.0
         if direction != self._direction:
             self.reset()
             self._direction = direction
             self._begin(angle)
-            return
-        if direction == 0:
             return
         self._elapsed += dt
         self._wanted += abs(velocity) * dt
@@ -80,5 +86,5 @@ class FollowWatch:
         if self._pushes:
             return f"blocked? load {100 * abs(load):.0f} %"
         if self._frozen:
-            return "its position does not change: sensor stuck, or no drive?"
+            return "its position does not change: blocked, no drive, or its sensor is stuck?"
         return "it moves otherwise than told"

@@ -371,11 +371,10 @@ def test_a_joint_that_does_not_follow_stops_the_robot(
         doubts.add(judge(chain.readings()[1], THRESHOLDS, math.nan).text)
     assert fault == (
         "told to move and not seen moving: joint_1 (servo id 1) (its position does not change: "
-        "sensor stuck, or no drive?), joint_2 (servo id 2) (blocked? load 68 %)"
+        "blocked, no drive, or its sensor is stuck?), joint_2 (servo id 2) (blocked? load 68 %)"
     )
     assert "does not follow: blocked? load 68 %" in doubts
-    chain.write(None)
-    chain.write(None)
+    chain.arm()
     assert chain.readings()[1].doubt == ""
 
 

@@ -80,8 +80,18 @@ def test_a_doubt_that_was_wrong_is_dropped():
 
 def test_rest_and_reversal_begin_anew():
     assert watched(lambda _: 0.0, lambda _: 0.0, 10.0) is None
-    assert watched(lambda t: 0.5 if t % 1.0 < 0.5 else 0.0, lambda _: 0.0, 10.0) is None
+    assert watched(lambda t: 0.5 if t % 1.4 < 0.38 else 0.0, lambda _: 0.0, 10.0) is None
     assert watched(lambda t: math.copysign(0.5, math.sin(5 * t)), lambda _: 0.0, 10.0) is None
+
+
+def go_and_rest(t):
+    return 0.5 if t % 0.3 < 0.2 else 0.0
+
+
+def test_a_short_rest_does_not_hide_a_joint_that_does_not_follow():
+    at, _ = watched(go_and_rest, lambda _: 0.0, 10.0)
+    assert at == pytest.approx(1.45, abs=0.1)
+    assert watched(go_and_rest, go_and_rest, 10.0) is None
 
 
 def test_an_unknown_angle_is_no_success():
