@@ -187,6 +187,15 @@ def advance(
         motion.angle_rad += (before + 0.5 * change) * h
 
 
+def block(motion: Motion, drive: Drive) -> None:
+    """Keep the shaft where it is, in place: at rest speed control gives all that the goal asks."""
+    motion.speed_rad_s = 0.0
+    if isinstance(drive, OpenLoop):
+        motion.output = drive.output
+    else:
+        motion.output = drive.output(drive.error(motion.angle_rad))
+
+
 def _target(
     motion: Motion, drive: Drive, motor: MotorParameters, load_nm: float, torque: float
 ) -> tuple[float, float]:

@@ -162,11 +162,11 @@ class Servo:
     def step(self, dt: float, load_nm: float = 0.0) -> None:
         """Let ``dt`` seconds pass under a load: the torque that holding the joint takes [N m]."""
         p, motion, drive, outside = self.parameters, self.motion, self._drive, self.disturbance
-        angle = motion.angle_rad
         load_nm += outside.extra_load_nm
-        mechanics.advance(motion, drive, p.motor, load_nm, self._supply_voltage_v, dt)
         if outside.shaft_blocked:
-            motion.angle_rad, motion.speed_rad_s = angle, 0.0
+            mechanics.block(motion, drive)
+        else:
+            mechanics.advance(motion, drive, p.motor, load_nm, self._supply_voltage_v, dt)
         self._sensor.step(motion.angle_rad, dt)
         self.health.step(p.health, motion.output, self._overloaded(load_nm), dt)
         if outside.temperature_c is not None:

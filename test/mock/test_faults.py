@@ -164,6 +164,8 @@ def test_a_blocked_shaft_stays_and_overloads_the_servo(rig):
     rig.answer(instruction(1, WRITE, 30, *word(600), *word(0)))
     rig.pass_time(1.8)
     assert rig.ping(1) == status(1)
+    # It gives all it has, counter-clockwise.
+    assert rig.answer(instruction(1, READ, 40, 2)) == status(1, 0, *word(1023))
     rig.pass_time(0.4)
     assert rig.ping(1) == status(1, OVERLOAD)
     assert (servo.motion.angle_rad, servo.registers["torque_limit"]) == (0.0, 0)
