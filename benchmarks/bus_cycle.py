@@ -114,7 +114,7 @@ def _mock(directory: str, return_delay_raw: int) -> Iterator[str]:
     link = str(Path(directory) / f"bus_{return_delay_raw}")
     process = subprocess.Popen(
         [sys.executable, "-m", "snake_control.mock", "--port-link", link, "--ids", "1-11"]
-        + ["--return-delay", str(return_delay_raw)],
+        + ["--return-delay", str(return_delay_raw), "--punctual", "--step-hz", "100"],
         cwd=_ROOT,
         stdout=subprocess.DEVNULL,
     )

@@ -24,6 +24,8 @@ from snake_control.mock.servo import Servo, ServoParameters
 from snake_control.mock.simulation import Simulation
 from snake_control.mock.units import in_sensor_range
 
+_SPIN_S = 3e-4
+
 
 def ids(text: str) -> list[int]:
     """Read ids such as ``1-11`` or ``1,2,5-7``; an id that is named twice is on the line twice.
@@ -96,6 +98,11 @@ def _parser() -> argparse.ArgumentParser:
         action="store_true",
         help="take EEPROM writes also while torque is on, as the manual of 2006 has it",
     )
+    add(
+        "--punctual",
+        action="store_true",
+        help="stay awake for replies that are due: less late; takes processor time",
+    )
     add("--no-wire-time", action="store_true", help="let bytes take no time")
     add("--scenario", help="file of faults with their times (docs/faults.md)")
     add("--seed", type=int, default=0, help="of faults and of readings in the dead zone")
@@ -139,6 +146,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 Bus(servos, wire_time=not given.no_wire_time),
                 Simulation(servos, 1 / given.step_hz, time.monotonic()),
                 time.monotonic,
+                spin_s=_SPIN_S if given.punctual else 0.0,
                 seed=given.seed,
                 log=lambda line: print(line, flush=True),
             )

@@ -46,7 +46,8 @@ def test_against_60_digits(robot):
         # Relative error of V_b1 is the absolute one of its logarithm.
         assert abs(float(log_V_b1 - posture.log_V_b1)) < 1e-10
         scale = np.abs(F_bar).max(axis=0)
-        assert (np.abs(posture.k.F_bar - F_bar) / scale).max() < 1e-11
+        # 1e-11 with some BLAS kernels, a little more with others.
+        assert (np.abs(posture.k.F_bar - F_bar) / scale).max() < 5e-11
         largest = np.abs(posture.log_V_b1_gradient).max()
         h = mp.mpf(10) ** -20
         for component in (3, 4, 7, 10, 11, 16, robot.links + 4):
