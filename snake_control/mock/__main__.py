@@ -17,10 +17,11 @@ from snake_control.errors import SnakeError
 from snake_control.mock.bus import Bus
 from snake_control.mock.fault_kinds import KINDS
 from snake_control.mock.models import MODELS
+from snake_control.mock.parameters import ServoParameters
 from snake_control.mock.port import PtyPort
 from snake_control.mock.scenario import load_scenario
 from snake_control.mock.server import Server
-from snake_control.mock.servo import Servo, ServoParameters
+from snake_control.mock.servo import Servo
 from snake_control.mock.simulation import Simulation
 from snake_control.mock.units import in_sensor_range
 

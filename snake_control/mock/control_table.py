@@ -6,6 +6,7 @@ Source: AX-12 User's Manual (2006-06-14), page 12 ff. and 19; e-manual AX-12A, "
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Mapping
 
 TABLE_SIZE = 50
@@ -109,11 +110,13 @@ TABLE: tuple[Register, ...] = (
 
 BY_NAME: Mapping[str, Register] = {register.name: register for register in TABLE}
 _SPAN: Mapping[str, slice] = {r.name: slice(r.address, r.end) for r in TABLE}
+_BYTES: Mapping[str, tuple[int, int]] = {r.name: (r.address, r.size) for r in TABLE}
 _AT: Mapping[int, Register] = {
     address: register for register in TABLE for address in range(register.address, register.end)
 }
 
 
+@functools.cache
 def registers_in(address: int, size: int) -> tuple[Register, ...]:
     """Return the items that ``size`` bytes from ``address`` touch, in order.
 
@@ -137,11 +140,12 @@ class RegisterFile:
         """
         self._bytes = bytearray(TABLE_SIZE)
         self._defaults = {r.name: r.default for r in TABLE} | dict(defaults or {})
-        for name, value in self._defaults.items():
-            self[name] = value
+        self.reset()
 
     def __getitem__(self, name: str) -> int:
-        return int.from_bytes(self._bytes[_SPAN[name]], "little")
+        address, size = _BYTES[name]
+        low = self._bytes[address]
+        return low if size == 1 else low | self._bytes[address + 1] << 8
 
     def __setitem__(self, name: str, value: int) -> None:
         register = BY_NAME[name]
@@ -160,3 +164,8 @@ class RegisterFile:
         for register in TABLE:
             if not register.eeprom:
                 self[register.name] = self._defaults[register.name]
+
+    def reset(self) -> None:
+        """Give everything the values that the factory gave it."""
+        for name, value in self._defaults.items():
+            self[name] = value

@@ -16,19 +16,35 @@ from snake_control.mock.protocol import (
     StatusPacket,
 )
 from snake_control.mock.servo import Servo
+from snake_control.mock.volatile import RegisteredWrite
 
 _MEASURED = range(BY_NAME["present_position"].address, BY_NAME["moving"].end)
 
 
 def execute(servo: Servo, packet: InstructionPacket) -> StatusPacket | None:
-    """Carry out an instruction and return the reply, ``None`` if the servo stays silent."""
-    if packet.id not in (servo.id, BROADCAST_ID):
+    """Carry out an instruction and return the reply, ``None`` if the servo stays silent.
+
+    Id and Status Return Level of before count: a write that changes them is still answered under
+    the old id and by the old level (manual, examples 4 and 14).
+    """
+    if packet.id not in (servo.id, BROADCAST_ID) or not servo.powered:
         return None
     own_id, level = servo.id, servo.registers["status_return_level"]
     error, data = _carry_out(servo, packet)
-    if packet.id == BROADCAST_ID or level < _reply_level(packet.instruction):
+    if error:
+        servo.alarm(error)
+    if packet.id == BROADCAST_ID and not _answers_all(servo, packet):
         return None
-    return StatusPacket(own_id, servo.error | error, data)
+    if level < _reply_level(packet.instruction):
+        return None
+    # Flags are slow to join, and mostly there are none.
+    if servo.error:
+        error |= servo.error
+    return StatusPacket(own_id, error, data)
+
+
+def _answers_all(servo: Servo, packet: InstructionPacket) -> bool:
+    return servo.parameters.answers_broadcast_ping and packet.instruction == Instruction.PING
 
 
 def _reply_level(instruction: int) -> int:
@@ -56,7 +72,9 @@ def _carry_out(servo: Servo, packet: InstructionPacket) -> tuple[ErrorBit, bytes
             return _action(servo), nothing
         case Instruction.SYNC_WRITE if packet.id == BROADCAST_ID:
             return _sync_write(servo, p), nothing
-    # Also FACTORY_RESET, which the AX-12's firmware does not have, and BULK_READ.
+        case Instruction.FACTORY_RESET if not p and servo.parameters.has_factory_reset:
+            return _factory_reset(servo), nothing
+    # Also BULK_READ, which no AX knows.
     return ErrorBit.INSTRUCTION, nothing
 
 
@@ -80,18 +98,26 @@ def _write(servo: Servo, address: int, data: bytes) -> ErrorBit:
 def _register_write(servo: Servo, address: int, data: bytes) -> ErrorBit:
     error = _check_write(servo, address, data)
     if not error:
-        servo.waiting = address, data
-        servo.store("registered", 1)
+        servo.waiting = RegisteredWrite(address, data)
     return error
 
 
 def _action(servo: Servo) -> ErrorBit:
-    if servo.waiting is None:
+    write = servo.waiting
+    if write is None:
         return ErrorBit.INSTRUCTION
-    address, data = servo.waiting
     servo.waiting = None
-    servo.store("registered", 0)
-    return _write(servo, address, data)
+    # Torque, lock or angle limits may have changed since it was checked.
+    return _write(servo, write.address, write.data)
+
+
+def _factory_reset(servo: Servo) -> ErrorBit:
+    """Reset, where a write of the EEPROM would be possible; the manuals give no rule."""
+    driven = servo.driven and servo.parameters.eeprom_needs_torque_off
+    if driven or servo.registers["lock"]:
+        return ErrorBit.RANGE
+    servo.factory_reset()
+    return ErrorBit.NONE
 
 
 def _sync_write(servo: Servo, parameters: bytes) -> ErrorBit:
@@ -105,7 +131,9 @@ def _sync_write(servo: Servo, parameters: bytes) -> ErrorBit:
     own_id = servo.id
     for start in range(0, len(entries), size + 1):
         if entries[start] == own_id:
-            error |= _write(servo, address, entries[start + 1 : start + 1 + size])
+            refused = _write(servo, address, entries[start + 1 : start + 1 + size])
+            if refused:
+                error |= refused
     return error
 
 
@@ -126,7 +154,9 @@ def _check_write(servo: Servo, address: int, data: bytes) -> ErrorBit:
     for register in touched:
         offset = register.address - address
         value = int.from_bytes(data[offset : offset + register.size], "little")
-        error |= _check_value(servo, register, value)
+        wrong = _check_value(servo, register, value)
+        if wrong:
+            error |= wrong
     return error
 
 

@@ -7,6 +7,7 @@ apply to hold its joint; outputs are fractions of the motor's full voltage, -1 t
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 
 from snake_control.mock.units import TICK_RAD
@@ -23,6 +24,8 @@ class MotorParameters:
         friction_torque_nm: friction of the gear, at rest and moving; less than the stall torque
             [N m].
         rated_voltage_v: voltage that the figures above belong to [V].
+        joint_mode_speed_rad_s: largest speed that the firmware lets it have in joint mode; by
+            default as fast as it can [rad/s].
     """
 
     stall_torque_nm: float = 1.5
@@ -30,12 +33,14 @@ class MotorParameters:
     acceleration_rad_s2: float = 60.0
     friction_torque_nm: float = 0.1
     rated_voltage_v: float = 12.0
+    joint_mode_speed_rad_s: float = math.inf
 
     def __post_init__(self) -> None:
         for field in dataclasses.fields(self):
             value = getattr(self, field.name)
             low_ok = value >= 0 if field.name == "friction_torque_nm" else value > 0
-            if not (math.isfinite(value) and low_ok):
+            unlimited = field.name == "joint_mode_speed_rad_s" and value == math.inf
+            if not (low_ok and (math.isfinite(value) or unlimited)):
                 raise ValueError(f"{field.name} = {value!r}: give a positive number")
         if self.friction_torque_nm >= self.stall_torque_nm:
             raise ValueError("friction_torque_nm must be less than stall_torque_nm")
@@ -129,6 +134,7 @@ def slope_ticks(raw: int) -> int:
     return next((s for s in SLOPE_STEPS_TICKS if raw < 2 * s), SLOPE_STEPS_TICKS[-1])
 
 
+@functools.lru_cache(maxsize=1024)
 def side(margin_ticks: int, slope_raw: int) -> Side:
     """Build one side's compliance from its two registers."""
     return Side(margin_ticks * TICK_RAD, slope_ticks(slope_raw) * TICK_RAD)

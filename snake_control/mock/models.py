@@ -29,6 +29,8 @@ class Model:
     motor: MotorParameters
 
     def __post_init__(self) -> None:
+        if not 0 <= self.number <= 0xFFFF:
+            raise ValueError(f"{self.name}: number = {self.number!r}: give 0 to 65535")
         for name, value in self.defaults.items():
             register = BY_NAME[name]
             if not register.low <= value <= register.high:
@@ -62,7 +64,12 @@ AX_12W = Model(
     "AX-12W",
     300,
     {**_same(_MARGINS, 4), **_same(_SLOPES, 64)},
-    MotorParameters(stall_torque_nm=0.2, no_load_speed_rad_s=470 * _RPM, friction_torque_nm=0.01),
+    MotorParameters(
+        stall_torque_nm=0.2,
+        no_load_speed_rad_s=470 * _RPM,
+        friction_torque_nm=0.01,
+        joint_mode_speed_rad_s=54 * _RPM,
+    ),
 )
 AX_18A = Model(
     "AX-18A",

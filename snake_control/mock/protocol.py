@@ -42,6 +42,10 @@ class ErrorBit(enum.IntFlag):
     INSTRUCTION = 64
 
 
+CONDITIONS = int(ErrorBit.INPUT_VOLTAGE | ErrorBit.OVERHEATING | ErrorBit.OVERLOAD)
+"""Error bits of what lasts; the others are about the instruction that a status answers."""
+
+
 @dataclasses.dataclass(frozen=True)
 class InstructionPacket:
     """One instruction as it came over the wire.

@@ -2,51 +2,33 @@
 
 from __future__ import annotations
 
-import dataclasses
-import math
+import functools
 from collections.abc import Mapping
 
 import numpy as np
 
 from snake_control.mock import disturbance, mechanics, units
-from snake_control.mock.control_table import BY_NAME, RegisterFile, registers_in
-from snake_control.mock.health import Health, HealthParameters
+from snake_control.mock.control_table import BY_NAME, RAM_START, RegisterFile, registers_in
+from snake_control.mock.health import Health
 from snake_control.mock.models import AX_12A, Model
-from snake_control.mock.protocol import ErrorBit
+from snake_control.mock.parameters import ServoParameters, Shutdown
+from snake_control.mock.protocol import CONDITIONS, ErrorBit
 from snake_control.mock.sensor import Sensor
+from snake_control.mock.volatile import RegisteredWrite, Volatile
 
 _REST_RAD_S = 1e-3
 _REST_TIME_S = 0.1
 # Output this near to the torque limit counts as all that the servo has.
 _AT_THE_LIMIT = 0.99
+# Manual of 2006, page 15: the LED stops blinking 2 s after the error is over.
+_BLINKS_ON_FOR_S = 2.0
+_BEGINS_A_MOVE = frozenset({"goal_position", "torque_enable"})
+_ENDS_A_SHUTDOWN = frozenset({"torque_limit", "torque_enable"})
 
 
-@dataclasses.dataclass(frozen=True)
-class ServoParameters:
-    """What a servo is made of, and how strictly it reads its manual.
-
-    Attributes:
-        motor: motor and gear.
-        health: warming and overload.
-        supply_voltage_v: voltage at power-on [V].
-        eeprom_needs_torque_off: refuse EEPROM writes while the servo is driven, as the e-manual
-            asks; the manual of 2006 knows no such rule.
-        goal_enables_torque: let a write of Goal Position in joint mode switch torque on, as users
-            report of some firmware.
-        shutdown_clears_torque_enable: let an alarm shutdown also clear Torque Enable (manual of
-            2006), beside setting Torque Limit to 0 (e-manual).
-    """
-
-    motor: mechanics.MotorParameters = dataclasses.field(default_factory=mechanics.MotorParameters)
-    health: HealthParameters = dataclasses.field(default_factory=HealthParameters)
-    supply_voltage_v: float = 11.1
-    eeprom_needs_torque_off: bool = True
-    goal_enables_torque: bool = False
-    shutdown_clears_torque_enable: bool = False
-
-    def __post_init__(self) -> None:
-        if not 0 <= self.supply_voltage_v <= 25.5:
-            raise ValueError(f"supply_voltage_v = {self.supply_voltage_v!r}: give 0 to 25.5")
+@functools.cache
+def _names_in(address: int, size: int) -> frozenset[str]:
+    return frozenset(register.name for register in registers_in(address, size))
 
 
 class Servo:
@@ -58,8 +40,6 @@ class Servo:
         motion: state of the shaft.
         health: temperature and overload.
         disturbance: what acts on it from outside.
-        powered: whether it has its supply; without, it neither hears nor moves by itself.
-        waiting: address and bytes of a REG_WRITE that waits for its ACTION.
         id: the id that it answers to.
         baud_rate: bits per second that it listens at, 2000000 / (register + 1).
         return_delay_s: from an instruction's last byte to the reply's first [s].
@@ -90,8 +70,7 @@ class Servo:
             ValueError: a register that is no EEPROM, or a value outside its range.
         """
         self.parameters = parameters or ServoParameters(motor=model.motor)
-        self.registers = RegisterFile(model.defaults)
-        self.registers["model_number"] = model.number
+        self.registers = RegisterFile({**model.defaults, "model_number": model.number})
         for name, value in {"id": servo_id, **(eeprom or {})}.items():
             register = BY_NAME[name]
             if not register.eeprom or not register.low <= value <= register.high:
@@ -102,6 +81,8 @@ class Servo:
         self.health = Health(self.parameters.health.ambient_c)
         self.disturbance = disturbance.NONE
         self.supply_voltage_v = self.parameters.supply_voltage_v
+        self._powered = False
+        self._take_eeprom()
         self.power_on()
 
     @property
@@ -115,6 +96,11 @@ class Servo:
             raise ValueError(f"supply_voltage_v = {voltage_v!r}: give 0 to 25.5")
         self._supply_voltage_v = voltage_v
 
+    @property
+    def powered(self) -> bool:
+        """Whether it has its supply; without, it neither hears nor drives."""
+        return self._powered
+
     def power_cycle(self) -> None:
         """Switch the power off and on: RAM returns to its defaults, the shaft stays."""
         self.power_off()
@@ -122,42 +108,73 @@ class Servo:
 
     def power_off(self) -> None:
         """Take the supply away: the shaft is free, and the RAM is lost."""
-        self.powered = False
-        self._driven = False
-        self._drive: mechanics.Drive = mechanics.OpenLoop()
-        self._executing = False
+        self._powered = False
+        self._forget()
 
     def power_on(self) -> None:
-        """Give it its supply: RAM has its defaults, Goal Position is where the shaft is."""
-        self.powered = True
+        """Give it its supply: RAM has its defaults, Goal Position is where the shaft is.
+
+        Nothing happens if it has it.
+        """
+        if not self._powered:
+            self._powered = True
+            self._start()
+
+    def factory_reset(self) -> None:
+        """Give the control table the factory's values, and start anew."""
+        self.registers.reset()
+        self._take_eeprom()
+        self._start()
+
+    def _start(self) -> None:
+        self._forget()
         r = self.registers
-        r.reset_ram()
         r["torque_limit"] = r["max_torque"]
         r["goal_position"] = self._sensor.position(self.motion.angle_rad)
-        self._driven = False
-        self.waiting: tuple[int, bytes] | None = None
-        self._conditions = ErrorBit.NONE
-        self._tripped = ErrorBit.NONE
-        self._executing = False
-        self._resting_for_s = 0.0
+        self._take_ram()
+
+    def _forget(self) -> None:
+        self.registers.reset_ram()
+        self._now = Volatile()
         self._frozen: tuple[int, int] | None = None
         self.health.overloaded_for_s = 0.0
-        self._refresh()
+        self._take_ram()
 
     @property
     def driven(self) -> bool:
         """Whether the motor is powered: after Torque Enable, or a Moving Speed in wheel mode."""
-        return self._driven
+        return self._now.driven
 
     @property
     def error(self) -> ErrorBit:
         """Conditions that every reply reports; those that shut the servo down stay."""
-        return self._conditions | self._tripped
+        bits = self._now.conditions | self._now.tripped
+        return ErrorBit(bits) if bits else ErrorBit.NONE
+
+    @property
+    def shut_down(self) -> bool:
+        """Whether an alarm has switched the motor off."""
+        return self._now.shut_down
+
+    @property
+    def led_blinks(self) -> bool:
+        """Whether the LED blinks for an alarm; the LED register has no say then."""
+        return self._now.blinking_for_s > 0.0
 
     @property
     def moving(self) -> bool:
         """Whether a goal is being executed."""
-        return self._executing
+        return self._now.executing
+
+    @property
+    def waiting(self) -> RegisteredWrite | None:
+        """The REG_WRITE that waits for its ACTION."""
+        return self._now.waiting
+
+    @waiting.setter
+    def waiting(self, write: RegisteredWrite | None) -> None:
+        self._now.waiting = write
+        self.registers["registered"] = int(write is not None)
 
     def step(self, dt: float, load_nm: float = 0.0) -> None:
         """Let ``dt`` seconds pass under a load: the torque that holding the joint takes [N m]."""
@@ -171,54 +188,89 @@ class Servo:
         self.health.step(p.health, motion.output, self._overloaded(load_nm), dt)
         if outside.temperature_c is not None:
             self.health.temperature_c = outside.temperature_c
-        if self.powered:
-            self._watch()
-        if self._executing:
+        if not self._powered:
+            return
+        self._watch(dt)
+        if self._now.executing:
             self._follow_execution(drive, dt)
 
     def _overloaded(self, load_nm: float) -> bool:
-        """Whether the load is more than torque limit and gear friction carry together.
+        """Whether the torque limit does not do: e-manual, "cannot be controlled by the set torque".
 
-        A shaft that is held fast loads the servo with all the output that its drive gives.
+        That is a load beyond limit and gear friction together; or a shaft that does not turn
+        where all the limit drives it, because it is held fast or at the end of its strength.
         """
-        limit = self._torque_limit
-        if not self._driven or limit == 0:
+        limit = self._limit
+        if limit == 0.0:
             return False
-        if self.disturbance.shaft_blocked and abs(self.motion.output) >= _AT_THE_LIMIT * limit:
-            return True
-        motor = self.parameters.motor
+        motion, motor = self.motion, self.parameters.motor
+        output = motion.output
+        if abs(output) >= _AT_THE_LIMIT * limit:
+            forwards = motion.speed_rad_s if output > 0.0 else -motion.speed_rad_s
+            if forwards < _REST_RAD_S:
+                return True
         carried = limit * motor.torque(self._supply_voltage_v) + motor.friction_torque_nm
         return abs(load_nm) > carried
 
-    def _watch(self) -> None:
-        self._conditions = self.health.conditions(
+    def _watch(self, dt: float) -> None:
+        now = self._now
+        if now.blinking_for_s > 0.0:
+            now.blinking_for_s -= dt
+        now.conditions = self.health.conditions(
             self.parameters.health,
             self._supply_voltage_v,
             self._voltage_limits_v,
             self._temperature_limit_c,
         )
-        if not self._conditions:
+        if now.conditions:
+            self.alarm(now.conditions)
+
+    def alarm(self, errors: int) -> None:
+        """Do about errors what Alarm LED and Alarm Shutdown say.
+
+        An error of an instruction can shut down, too; only conditions are also reported by the
+        replies that follow, because an instruction's error bits are about that instruction.
+
+        Args:
+            errors: bits of ``ErrorBit``.
+        """
+        now = self._now
+        if errors & self._alarm_led:
+            now.blinking_for_s = _BLINKS_ON_FOR_S
+        tripping = errors & self._alarm_shutdown
+        if not tripping:
             return
-        tripping = self._conditions & self.registers["alarm_shutdown"]
-        if tripping:
-            self._tripped |= tripping
+        now.tripped |= tripping & CONDITIONS
+        if now.shut_down:
+            return
+        now.shut_down = True
+        clears = self.parameters.shutdown_clears
+        if Shutdown.TORQUE_LIMIT in clears:
             self.store("torque_limit", 0)
-            if self.parameters.shutdown_clears_torque_enable:
-                self.store("torque_enable", 0)
+        if Shutdown.TORQUE_ENABLE in clears:
+            self.store("torque_enable", 0)
+
+    def _recovers(self) -> bool:
+        """Whether all that a shutdown clears has been written again."""
+        clears, r = self.parameters.shutdown_clears, self.registers
+        limited = Shutdown.TORQUE_LIMIT in clears and r["torque_limit"] == 0
+        disabled = Shutdown.TORQUE_ENABLE in clears and r["torque_enable"] == 0
+        return not (limited or disabled)
 
     def _follow_execution(self, drive: mechanics.Drive, dt: float) -> None:
+        now = self._now
         at_rest = abs(self.motion.speed_rad_s) < _REST_RAD_S
-        self._resting_for_s = self._resting_for_s + dt if at_rest else 0.0
+        now.resting_for_s = now.resting_for_s + dt if at_rest else 0.0
         if not isinstance(drive, mechanics.ToGoal):
-            self._executing = False
+            now.executing = False
             return
         error = drive.error(self.motion.angle_rad)
         arrived = abs(error) <= drive.side(error).margin_rad
         # A load can keep the shaft away from the margin for ever: then rest is the end.
-        self._executing = not arrived and self._resting_for_s < _REST_TIME_S
+        now.executing = not arrived and now.resting_for_s < _REST_TIME_S
 
-    def _refresh(self) -> None:
-        """Take over what the registers say; reading them in every step would cost too much."""
+    def _take_eeprom(self) -> None:
+        """Take over what the EEPROM says; reading it in every step would cost too much."""
         r = self.registers
         self.id = r["id"]
         self.baud_rate = 2_000_000 / (r["baud_rate"] + 1)
@@ -231,23 +283,29 @@ class Servo:
         )
         self._voltage_limits_v = r["min_voltage_limit"] / 10, r["max_voltage_limit"] / 10
         self._temperature_limit_c = float(r["temperature_limit"])
-        self._torque_limit = r["torque_limit"] / units.OUTPUT_STEPS
-        self._drive = self._read_drive()
+        self._alarm_led, self._alarm_shutdown = r["alarm_led"], r["alarm_shutdown"]
+
+    def _take_ram(self) -> None:
+        """Take over what the RAM asks of the motor."""
+        now = self._now
+        on = now.driven and not now.shut_down
+        self._limit = self.registers["torque_limit"] / units.OUTPUT_STEPS if on else 0.0
+        self._drive = self._read_drive() if on else mechanics.OpenLoop()
 
     def _read_drive(self) -> mechanics.Drive:
-        """Turn the registers into what they ask of the motor."""
+        """Turn the registers into what they ask of a motor that is switched on."""
         r = self.registers
-        if not self._driven:
-            return mechanics.OpenLoop()
-        limit = self._torque_limit
+        limit = self._limit
         speed = r["moving_speed"]
         if self.wheel_mode:
             output = min((speed & 0x3FF) / units.OUTPUT_STEPS, limit)
             return mechanics.OpenLoop(-output if speed & units.DIRECTION_BIT else output)
+        # A value beyond 1023 can only be left over from wheel mode; its direction has no meaning.
         speed &= 0x3FF
+        fastest = self.parameters.motor.joint_mode_speed_rad_s
         return mechanics.ToGoal(
             goal_rad=units.angle_from_ticks(r["goal_position"]),
-            speed_rad_s=speed * units.SPEED_UNIT_RAD_S if speed else math.inf,
+            speed_rad_s=min(speed * units.SPEED_UNIT_RAD_S, fastest) if speed else fastest,
             ccw=mechanics.side(r["ccw_compliance_margin"], r["ccw_compliance_slope"]),
             cw=mechanics.side(r["cw_compliance_margin"], r["cw_compliance_slope"]),
             punch=r["punch"] / units.OUTPUT_STEPS,
@@ -261,25 +319,34 @@ class Servo:
 
     def store_bytes(self, address: int, data: bytes) -> None:
         """Set whole registers, whether an instruction could or not, with all that follows."""
-        r = self.registers
+        r, now = self.registers, self._now
         r.write(address, data)
-        names = {register.name for register in registers_in(address, len(data))}
-        if "torque_enable" in names:
-            self._driven = bool(r["torque_enable"])
+        names = _names_in(address, len(data))
+        if self._powered:
+            self._switch(names)
         # The mode before the write counts, which no block of registers can change with the speed.
-        if "moving_speed" in names and self.wheel_mode:
-            self._driven = True
-        enables = self.parameters.goal_enables_torque and not self.wheel_mode
-        if "goal_position" in names and enables:
-            self._driven = True
-            r["torque_enable"] = 1
-        if "torque_limit" in names and r["torque_limit"]:
-            self._tripped = ErrorBit.NONE
-        self._refresh()
-        if names & {"goal_position", "torque_enable"} and isinstance(self._drive, mechanics.ToGoal):
-            self._resting_for_s = 0.0
+        if address < RAM_START:
+            self._take_eeprom()
+        self._take_ram()
+        if names & _BEGINS_A_MOVE and isinstance(self._drive, mechanics.ToGoal):
+            now.resting_for_s = 0.0
             error = self._drive.error(self.motion.angle_rad)
-            self._executing = abs(error) > self._drive.side(error).margin_rad
+            now.executing = abs(error) > self._drive.side(error).margin_rad
+
+    def _switch(self, written: frozenset[str]) -> None:
+        """Switch the motor, and end a shutdown, as written registers ask for."""
+        r, now = self.registers, self._now
+        if "torque_enable" in written:
+            now.driven = bool(r["torque_enable"])
+        if self.wheel_mode:
+            if "moving_speed" in written:
+                now.driven = True
+        elif "goal_position" in written and self.parameters.goal_enables_torque:
+            now.driven = True
+            r["torque_enable"] = 1
+        if now.shut_down and written & _ENDS_A_SHUTDOWN and self._recovers():
+            now.shut_down = False
+            now.tripped = 0
 
     def measure(self) -> None:
         """Fill the Present registers and Moving."""
@@ -299,4 +366,4 @@ class Servo:
         r["present_load"] = units.signed_magnitude(motion.output * units.OUTPUT_STEPS)
         r["present_voltage"] = min(max(round(self._supply_voltage_v * 10), 0), 255)
         r["present_temperature"] = min(max(round(self.health.temperature_c), 0), 255)
-        r["moving"] = int(self._executing)
+        r["moving"] = int(self._now.executing)

@@ -24,10 +24,11 @@ from snake_control.mock.bus import Bus
 from snake_control.mock.faults import Fault
 from snake_control.mock.mechanics import MotorParameters
 from snake_control.mock.motion_capture import CapturedPose, MotionCapture, Noise
+from snake_control.mock.parameters import ServoParameters
 from snake_control.mock.port import PtyPort
 from snake_control.mock.scenario import load_scenario
 from snake_control.mock.server import Server
-from snake_control.mock.servo import Servo, ServoParameters
+from snake_control.mock.servo import Servo
 from snake_control.mock.simulation import BodySimulation, Mounting, Snapshot
 from snake_control.mock.units import in_sensor_range
 from snake_control.model.rotation import quaternion_from_rpy

@@ -3,8 +3,9 @@ import dataclasses
 import pytest
 
 from snake_control.mock.firmware import execute
+from snake_control.mock.parameters import ServoParameters
 from snake_control.mock.protocol import ErrorBit, InstructionPacket, StatusPacket
-from snake_control.mock.servo import Servo, ServoParameters
+from snake_control.mock.servo import Servo
 from support.packets import (
     ACTION,
     BROADCAST,

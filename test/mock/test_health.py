@@ -2,8 +2,9 @@ import pytest
 
 from snake_control.mock.firmware import execute
 from snake_control.mock.health import Health, HealthParameters
+from snake_control.mock.parameters import ServoParameters, Shutdown
 from snake_control.mock.protocol import ErrorBit, InstructionPacket
-from snake_control.mock.servo import Servo, ServoParameters
+from snake_control.mock.servo import Servo
 from support.packets import WRITE, word
 
 OK = ErrorBit.NONE
@@ -66,7 +67,7 @@ def test_a_shut_down_servo_is_limp_and_says_so_until_it_gets_a_torque_limit():
 
 
 def test_the_manual_of_2006_also_clears_torque_enable():
-    servo = holding(ServoParameters(shutdown_clears_torque_enable=True))
+    servo = holding(ServoParameters(shutdown_clears=Shutdown.BOTH))
     run(servo, 2.1, load_nm=2.0)
 
     assert (servo.registers["torque_enable"], servo.driven) == (0, False)

@@ -13,7 +13,8 @@ from snake_control.mock.mechanics import (
     advance,
     slope_ticks,
 )
-from snake_control.mock.servo import Servo, ServoParameters
+from snake_control.mock.parameters import ServoParameters
+from snake_control.mock.servo import Servo
 from snake_control.mock.units import SPEED_UNIT_RAD_S, TICK_RAD, angle_from_ticks
 
 FRICTIONLESS = MotorParameters(friction_torque_nm=0.0)

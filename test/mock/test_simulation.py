@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from snake_control.mock.mechanics import MotorParameters
-from snake_control.mock.servo import Servo, ServoParameters
+from snake_control.mock.parameters import ServoParameters
+from snake_control.mock.servo import Servo
 from snake_control.mock.simulation import (
     LARGEST_LAG_S,
     BodySimulation,
