@@ -3,6 +3,7 @@ import dataclasses
 import pytest
 
 from snake_control.mock.firmware import execute
+from snake_control.mock.models import AX_18A
 from snake_control.mock.parameters import ServoParameters
 from snake_control.mock.protocol import ErrorBit, InstructionPacket, StatusPacket
 from snake_control.mock.servo import Servo
@@ -222,6 +223,65 @@ def test_a_registered_write_is_checked_at_once():
     assert read(servo, 44) == 0
 
 
+def test_a_later_registered_write_takes_the_place_of_an_earlier_one():
+    servo = Servo(1)
+    ask(servo, REG_WRITE, GOAL, *word(500))
+    ask(servo, REG_WRITE, LED, 1)
+    ask(servo, ACTION)
+
+    assert (read(servo, GOAL, 2), read(servo, LED)) == (512, 1)
+    assert error_of(servo, ACTION) == ErrorBit.INSTRUCTION
+
+
+def test_a_refused_registered_write_leaves_the_earlier_one_waiting():
+    servo = Servo(1)
+    ask(servo, REG_WRITE, GOAL, *word(500))
+    assert error_of(servo, REG_WRITE, GOAL, *word(1024)) == ErrorBit.RANGE
+    ask(servo, ACTION)
+
+    assert read(servo, GOAL, 2) == 500
+
+
+def test_a_write_between_does_not_disturb_a_registered_one():
+    servo = Servo(1)
+    ask(servo, REG_WRITE, GOAL, *word(500))
+    ask(servo, WRITE, GOAL, *word(700))
+    assert read(servo, GOAL, 2) == 700
+    ask(servo, ACTION)
+
+    assert read(servo, GOAL, 2) == 500
+
+
+def test_registered_writes_and_action_may_go_to_all():
+    servos = [Servo(i) for i in (1, 2)]
+    for servo in servos:
+        assert ask(servo, REG_WRITE, GOAL, *word(500), to=BROADCAST) is None
+        assert read(servo, GOAL, 2) == 512
+        assert ask(servo, ACTION, to=BROADCAST) is None
+
+    assert [read(servo, GOAL, 2) for servo in servos] == [500, 500]
+
+
+@pytest.mark.parametrize(
+    ("between", "registered", "error"),
+    [
+        ((LOCK, 1), (PUNCH, *word(99)), ErrorBit.RANGE),
+        ((TORQUE_ENABLE, 1), (5, 0), ErrorBit.RANGE),
+        ((8, *word(600)), (GOAL, *word(700)), ErrorBit.ANGLE_LIMIT),
+    ],
+)
+def test_an_action_is_checked_once_more(between, registered, error):
+    servo = Servo(1)
+    assert error_of(servo, REG_WRITE, *registered) == OK
+    assert error_of(servo, WRITE, *between) == OK
+    before = servo.registers.read(0, 44)
+
+    assert error_of(servo, ACTION) == error
+    assert servo.registers.read(0, 44) == before
+    assert read(servo, 44) == 0
+    assert error_of(servo, ACTION) == ErrorBit.INSTRUCTION
+
+
 def test_a_sync_write_reaches_each_servo_with_its_own_bytes():
     servos = [Servo(i) for i in (0, 1, 2)]
     parameters = bytes.fromhex("1E 04 00 10 00 50 01 01 20 02 60 03")
@@ -241,6 +301,31 @@ def test_a_sync_write_of_a_wrong_length_is_not_executed(cut):
     ask(servo, SYNC_WRITE, *parameters[:cut], to=BROADCAST)
 
     assert servo.registers["goal_position"] == 512
+
+
+@pytest.mark.parametrize("parameters", [(LED, 0, 1), (LED, 0, 1, 2), (50, 1, 1, 0), (LED, 2, 1, 1)])
+def test_a_sync_write_of_nothing_or_beyond_the_table_does_nothing(parameters):
+    servo = Servo(1)
+    before = servo.registers.read(0, 50)
+    ask(servo, SYNC_WRITE, *parameters, to=BROADCAST)
+
+    assert servo.registers.read(0, 50) == before
+
+
+def test_a_sync_write_refused_by_one_servo_still_reaches_the_others():
+    servos = [Servo(1), Servo(2)]
+    entries = (1, *word(1024), 2, *word(700))
+    for servo in servos:
+        ask(servo, SYNC_WRITE, GOAL, 2, *entries, to=BROADCAST)
+
+    assert [read(servo, GOAL, 2) for servo in servos] == [512, 700]
+
+
+def test_of_two_entries_for_one_servo_the_later_holds():
+    servo = Servo(1)
+    ask(servo, SYNC_WRITE, GOAL, 2, 1, *word(600), 1, *word(700), to=BROADCAST)
+
+    assert read(servo, GOAL, 2) == 700
 
 
 @pytest.mark.parametrize(
@@ -267,6 +352,61 @@ def test_the_status_return_level_says_what_is_answered(level, answered):
 
     assert [reply is not None for reply in replies] == answered
     assert servo.registers["led"] == 1
+
+
+@pytest.mark.parametrize("level", [0, 1])
+def test_a_change_of_the_status_return_level_counts_from_the_next_instruction(level):
+    servo = Servo(1)
+
+    assert ask(servo, WRITE, 16, level) == StatusPacket(1)
+    assert ask(servo, WRITE, 16, 2) is None
+    assert ask(servo, WRITE, LED, 1) == StatusPacket(1)
+
+
+def test_a_ping_with_a_wrong_checksum_is_answered_at_every_level():
+    servo = Servo(1, eeprom={"status_return_level": 0})
+    for code, answered in ((PING, True), (READ, False), (WRITE, False)):
+        status = execute(servo, InstructionPacket(1, code, b"", checksum_ok=False))
+        assert status == (StatusPacket(1, ErrorBit.CHECKSUM) if answered else None)
+
+
+def test_a_ping_to_all_is_answered_where_page_22_of_the_old_manual_holds():
+    servo = Servo(3, ServoParameters(answers_broadcast_ping=True))
+
+    assert ask(servo, PING, to=BROADCAST) == StatusPacket(3)
+    assert ask(servo, READ, 36, 2, to=BROADCAST) is None
+    assert ask(servo, WRITE, LED, 1, to=BROADCAST) is None
+
+
+def resettable(**eeprom: int) -> Servo:
+    return Servo(9, ServoParameters(has_factory_reset=True), eeprom=eeprom)
+
+
+def test_a_factory_reset_resets_everything_where_the_firmware_has_it():
+    servo = resettable(return_delay_time=0, baud_rate=34, max_torque=500)
+    ask(servo, WRITE, LED, 1)
+
+    assert ask(servo, FACTORY_RESET, to=9) == StatusPacket(9)
+    assert (servo.id, servo.baud_rate, servo.return_delay_s) == (1, 1_000_000, 500e-6)
+    fresh = Servo(1)
+    assert servo.registers.read(0, 50) == fresh.registers.read(0, 50)
+
+
+def test_a_factory_reset_keeps_the_model_with_its_defaults():
+    servo = Servo(9, ServoParameters(has_factory_reset=True), model=AX_18A)
+    ask(servo, FACTORY_RESET)
+
+    r = servo.registers
+    assert (r["model_number"], r["temperature_limit"], r["torque_limit"]) == (18, 75, 983)
+
+
+@pytest.mark.parametrize("address", [TORQUE_ENABLE, LOCK])
+def test_a_factory_reset_is_refused_like_any_write_of_the_eeprom(address):
+    servo = resettable()
+    ask(servo, WRITE, address, 1)
+
+    assert error_of(servo, FACTORY_RESET) == ErrorBit.RANGE
+    assert servo.id == 9
 
 
 def test_a_change_of_id_is_answered_under_the_old_one():

@@ -297,6 +297,8 @@ def test_a_step_stays_within_acceleration_and_speed(angle, speed, load, output, 
         {"acceleration_rad_s2": math.nan},
         {"friction_torque_nm": 1.5},
         {"friction_torque_nm": -0.1},
+        {"joint_mode_speed_rad_s": 0.0},
+        {"stall_torque_nm": math.inf},
     ],
 )
 def test_impossible_motors_are_refused(values):

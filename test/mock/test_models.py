@@ -30,6 +30,11 @@ def test_a_default_that_a_register_cannot_hold_is_refused():
         Model("X", 1, {"max_torque": 2000}, AX_12A.motor)
 
 
+def test_a_number_of_more_than_two_bytes_is_refused():
+    with pytest.raises(ValueError, match="number = 65536"):
+        Model("X", 65536, {}, AX_12A.motor)
+
+
 def test_the_older_servo_does_not_save_itself_from_an_overload():
     servo = Servo(1, model=AX_12)
     servo.store("torque_enable", 1)
