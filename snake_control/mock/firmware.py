@@ -1,8 +1,19 @@
 """What instructions do to a servo: access, ranges, lock, errors, and who gets a reply.
 
-Source: AX-12 User's Manual, pages 12 ff. and 19 ff.; e-manual, "Protocol 1.0". Where they are
-silent this firmware refuses: an instruction with a wrong number of parameters is an instruction
-error, a write to what is read-only or beyond the table is a range error.
+Source: AX-12 User's Manual (2006), pages 10 ff. and 19 ff.; e-manual, "Protocol 1.0". Where they
+differ, ``ServoParameters`` chooses. Where they are silent this firmware refuses, so that a program
+that gets along with it relies on nothing that a servo might not do:
+
+* a wrong number of parameters is an instruction error; a write to what is read-only, locked, or
+  beyond the table is a range error; so is a read of nothing or beyond the table, without data;
+* a write, also of several registers, is done wholly or not at all;
+* an EEPROM write to a servo that is driven is a range error;
+* Moving Speed beyond 1023 in joint mode is a range error; one left over from wheel mode counts
+  without its direction;
+* angle limits are for goals that are written while they hold: a goal from before stays, and so does
+  the goal that power-on takes from the shaft;
+* a registered write is checked when it comes and once more when it is carried out; a later one
+  takes its place.
 """
 
 from __future__ import annotations

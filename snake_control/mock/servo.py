@@ -347,6 +347,8 @@ class Servo:
         if now.shut_down and written & _ENDS_A_SHUTDOWN and self._recovers():
             now.shut_down = False
             now.tripped = 0
+            # What is still too much for it has its time again.
+            self.health.overloaded_for_s = 0.0
 
     def measure(self) -> None:
         """Fill the Present registers and Moving."""
