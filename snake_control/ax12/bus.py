@@ -3,6 +3,8 @@
 The SDK does not compare a reply's length with the request, so a short or an echoed packet would
 pass for data; here a reply counts only if it is as long as asked. A reply that does not come is
 a value (``None``), not an exception: the caller decides how many misses matter.
+
+A late reply must not pass for the next one: see ``requests``.
 """
 
 from __future__ import annotations
@@ -22,13 +24,16 @@ from dynamixel_sdk import (
     PacketHandler,
 )
 
-from snake_control.ax12.port import PORT_FAILURES, SerialPort
+from snake_control.ax12.port import PORT_FAILURES, Port
+from snake_control.ax12.requests import PING, WRITE, OwedReplies, Request, read_request
 from snake_control.ax12.units import REFUSED_BITS, error_names
 from snake_control.errors import BusError, ServoError
 
-_PING, _READ, _WRITE = 1, 2, 3
 # FF FF id length error | parameters | checksum; length counts error, parameters and checksum.
-_LENGTH_INDEX, _ERROR_INDEX, _PARAMETERS = 3, 4, 5
+_ID_INDEX, _LENGTH_INDEX, _ERROR_INDEX, _PARAMETERS = 2, 3, 4, 5
+
+_LONGEST_PACKET = 250
+_SYNC_WRITE_FRAME = 8
 
 _ERROR_RATE_REQUESTS = 100
 
@@ -70,11 +75,12 @@ class Bus:
         echoes: how many "replies" were the sent packet itself.
     """
 
-    def __init__(self, port: SerialPort, retries: int = 1) -> None:
+    def __init__(self, port: Port, retries: int = 1) -> None:
         self._port = port
         self._packets = PacketHandler(1.0)
         self._retries = retries
         self._groups: dict[tuple[int, int], GroupSyncWrite] = {}
+        self._owed: dict[int, OwedReplies] = {}
         self._owner: int | None = None
         self.counters: dict[int, Counters] = {}
         self.echoes = 0
@@ -105,7 +111,7 @@ class Bus:
         Raises:
             BusError: the port failed (so do all methods).
         """
-        return self._ask(servo_id, _PING, (), 0, retries)
+        return self._ask(servo_id, Request(PING), retries)
 
     def read(
         self, servo_id: int, address: int, length: int, retries: int | None = None
@@ -115,11 +121,11 @@ class Bus:
         Args:
             retries: how often to ask again; default as given to the constructor.
         """
-        return self._ask(servo_id, _READ, (address, length), length, retries)
+        return self._ask(servo_id, read_request(address, length), retries)
 
     def write(self, servo_id: int, address: int, data: bytes) -> Reply | None:
         """Write ``data`` and return the acknowledgement, ``None`` if none came."""
-        return self._ask(servo_id, _WRITE, (address, *data), 0, None)
+        return self._ask(servo_id, Request(WRITE, (address, *data)), None)
 
     def write_verified(self, servo_id: int, address: int, data: bytes) -> None:
         """Write ``data``, read it back and compare.
@@ -149,6 +155,8 @@ class Bus:
     def sync_write(self, address: int, values: Mapping[int, bytes]) -> None:
         """Write the same registers of several servos in one packet; servos do not reply to it.
 
+        More servos than a packet has room for, 48 with goal and speed, get several.
+
         Args:
             values: bytes by servo id, all of one length.
 
@@ -159,33 +167,36 @@ class Bus:
         if len(lengths) != 1:
             raise ValueError(f"give bytes of one length for each servo, not {sorted(lengths)}")
         length = lengths.pop()
+        at_once = (_LONGEST_PACKET - _SYNC_WRITE_FRAME) // (1 + length)
+        entries = list(values.items())
         with self._port_use():
             group = self._groups.setdefault(
                 (address, length), GroupSyncWrite(self._port, self._packets, address, length)
             )
-            group.clearParam()
-            for servo_id, data in values.items():
-                group.addParam(servo_id, list(data))
-            result = group.txPacket()
+            for start in range(0, len(entries), at_once):
+                group.clearParam()
+                for servo_id, data in entries[start : start + at_once]:
+                    group.addParam(servo_id, list(data))
+                result = group.txPacket()
+                if result != COMM_SUCCESS:
+                    break
         if result != COMM_SUCCESS:
             raise BusError(f"sync write failed: {self._packets.getTxRxResult(result)}")
 
-    def _ask(
-        self,
-        servo_id: int,
-        instruction: int,
-        parameters: tuple[int, ...],
-        reply_length: int,
-        retries: int | None,
-    ) -> Reply | None:
+    def _ask(self, servo_id: int, request: Request, retries: int | None) -> Reply | None:
         if not 0 <= servo_id < BROADCAST_ID:
             raise ValueError(f"no servo id: {servo_id}")
         counters = self.counters.setdefault(servo_id, Counters())
+        owed = self._owed.setdefault(servo_id, OwedReplies())
         retries = self._retries if retries is None else retries
         for attempt in range(1 + retries):
             if attempt:
                 counters.retries += 1
-            reply = self._transact(counters, servo_id, instruction, parameters, reply_length)
+            avoid = owed.lengths()
+            request = request.avoiding(avoid)
+            reply = self._transact(counters, servo_id, request, may_be_late=bool(avoid))
+            if reply is None:
+                owed.missed(request.length)
             if not attempt:
                 counters.tried_first(reply is not None)
             if reply is not None:
@@ -197,27 +208,31 @@ class Bus:
         return None
 
     def _transact(
-        self,
-        counters: Counters,
-        servo_id: int,
-        instruction: int,
-        parameters: tuple[int, ...],
-        reply_length: int,
+        self, counters: Counters, servo_id: int, request: Request, *, may_be_late: bool
     ) -> Reply | None:
+        instruction, parameters = request.instruction, request.parameters
         sent = [0, 0, servo_id, len(parameters) + 2, instruction, *parameters, 0]
+        echo = strange = False
         with self._port_use():
             received, result, _ = self._packets.txRxPacket(self._port, sent)
-        if result == COMM_RX_TIMEOUT:
-            return None
-        if result not in (COMM_SUCCESS, COMM_RX_CORRUPT):
+            while result == COMM_SUCCESS:
+                if received[_ID_INDEX] == servo_id:
+                    # A ping's echo looks like a reply with the voltage error bit; the READ after
+                    # it tells.
+                    echo = received == sent and instruction != PING
+                    if echo or received[_LENGTH_INDEX] == request.length + 2:
+                        break
+                    strange = True
+                # The right one may follow; the port's time goes on.
+                received, result = self._packets.rxPacket(self._port)
+        if result == COMM_SUCCESS and not echo:
+            begin = _PARAMETERS + request.skipped
+            return Reply(bytes(received[begin : begin + request.wanted]), received[_ERROR_INDEX])
+        if result not in (COMM_SUCCESS, COMM_RX_TIMEOUT, COMM_RX_CORRUPT):
             raise BusError(f"instruction failed: {self._packets.getTxRxResult(result)}")
-        # A ping's echo looks like a reply with the voltage error bit; the READ after it tells.
-        if received == sent and instruction != _PING:
-            self.echoes += 1
-        elif result == COMM_SUCCESS and received[_LENGTH_INDEX] == reply_length + 2:
-            data = bytes(received[_PARAMETERS : _PARAMETERS + reply_length])
-            return Reply(data, received[_ERROR_INDEX])
-        counters.corrupt_replies += 1
+        self.echoes += echo
+        if echo or result == COMM_RX_CORRUPT or (strange and not may_be_late):
+            counters.corrupt_replies += 1
         return None
 
     @contextmanager

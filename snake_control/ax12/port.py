@@ -6,6 +6,7 @@ Differences to the SDK's own PortHandler, each with its reason:
 * time-outs use the monotonic clock and a configured reply time, not time.time() and 34 ms;
 * old input is really discarded before each packet; SDK 4.0.3 only flushed its output there;
 * the port is opened once, locked against a second driver, and a blocked write ends;
+* a USB adapter's latency timer is lowered where that is allowed, else there is advice;
 * every failure is a ``BusError`` that says what to do.
 """
 
@@ -18,6 +19,7 @@ import select
 import termios
 import time
 from pathlib import Path
+from typing import Protocol
 
 from dynamixel_sdk import PortHandler
 
@@ -28,6 +30,30 @@ PORT_FAILURES = (OSError, termios.error)
 
 _WRITE_TIMEOUT_S = 0.1
 _BITS_PER_BYTE = 10
+_CHUNK = 4096
+
+USB_SERIAL_DEVICES = Path("/sys/bus/usb-serial/devices")
+"""Where the system keeps the settings of USB adapters that have a driver of their own."""
+
+UDEV_RULE = 'ACTION=="add", SUBSYSTEM=="usb-serial", DRIVER=="ftdi_sio", ATTR{latency_timer}="1"'
+"""Line of a file in /etc/udev/rules.d that sets the latency timer of every FTDI adapter."""
+
+
+class Port(Protocol):
+    """What ``Bus`` needs of a port, besides what the SDK does (``dynamixel_sdk.PortHandler``).
+
+    Attributes:
+        port_name: its path.
+        is_using: the SDK's mark that a packet is under way.
+        reply_timeout_s: how long to wait for a reply beyond the time its bytes take on the wire.
+    """
+
+    port_name: str
+    is_using: bool
+    reply_timeout_s: float
+
+    def close(self) -> None:
+        """Close it; harmless when it is closed already."""
 
 
 class SerialPort(PortHandler):  # type: ignore[misc]
@@ -56,7 +82,6 @@ class SerialPort(PortHandler):  # type: ignore[misc]
             if not self.setBaudRate(baud_rate):
                 raise BusError(f"{path}: dynamixel_sdk does not open ports at {baud_rate} baud")
             self.ser.exclusive = True
-            self.ser.write_timeout = _WRITE_TIMEOUT_S
         except BusError:
             raise
         except (*PORT_FAILURES, ValueError) as error:
@@ -80,6 +105,9 @@ class SerialPort(PortHandler):  # type: ignore[misc]
 
     def clearPort(self) -> None:
         """Discard everything received so far."""
+        if not self.is_open:
+            # Its number may be another file's by now.
+            raise OSError(errno.EBADF, "the port is closed")
         self._unread = b""
         termios.tcflush(self._fd, termios.TCIFLUSH)
 
@@ -98,19 +126,38 @@ class SerialPort(PortHandler):  # type: ignore[misc]
             ready, _, _ = select.select([self._fd], [], [], max(0.0, remaining))
             if not ready:
                 return b""
-            self._unread = os.read(self._fd, 4096)
+            self._unread = os.read(self._fd, _CHUNK)
             if not self._unread:
                 raise OSError(errno.EIO, "device reports ready to read but returns no data")
         data, self._unread = self._unread[:length], self._unread[length:]
         return data
 
     def writePort(self, packet: list[int]) -> int:
-        """Send a packet; return the number of bytes accepted."""
+        """Send a packet, all of it; return its length.
+
+        Raises:
+            TimeoutError: the device does not take it.
+        """
+        data = bytes(packet)
         now = time.monotonic()
-        duration = len(packet) * self._byte_time_s
-        self._wire_free_at = max(now, self._wire_free_at) + duration
-        written: int = self.ser.write(bytes(packet))
-        return written
+        self._wire_free_at = max(now, self._wire_free_at) + len(data) * self._byte_time_s
+        sent = self._write_some(data)
+        # Seldom: only a line that is slower than its driver keeps bytes waiting.
+        while sent < len(data):
+            remaining = now + _WRITE_TIMEOUT_S - time.monotonic()
+            _, ready, _ = select.select([], [self._fd], [], max(0.0, remaining))
+            if not ready:
+                raise TimeoutError(
+                    errno.ETIMEDOUT, f"the device took {sent} of {len(data)} bytes and no more"
+                )
+            sent += self._write_some(data[sent:])
+        return sent
+
+    def _write_some(self, data: bytes) -> int:
+        try:
+            return os.write(self._fd, data)
+        except BlockingIOError:
+            return 0
 
     def setPacketTimeout(self, packet_length: int) -> None:
         """Start waiting for a reply: what is still to be sent, the reply itself, the reply time."""
@@ -131,20 +178,35 @@ class SerialPort(PortHandler):  # type: ignore[misc]
         # Only USB serial adapters with a timer know it.
         with contextlib.suppress(*PORT_FAILURES, ValueError):
             self.ser.set_low_latency_mode(True)
-        name = Path(os.path.realpath(path)).name
-        timer = Path("/sys/bus/usb-serial/devices") / name / "latency_timer"
-        try:
-            latency_ms = int(timer.read_text())
-        except (OSError, ValueError):
-            return
-        if latency_ms > 1:
+        timer = USB_SERIAL_DEVICES / Path(os.path.realpath(path)).name / "latency_timer"
+        latency_ms = lower_latency_timer(timer)
+        if latency_ms is not None and latency_ms > 1:
             self.reply_timeout_s = max(self.reply_timeout_s, 2e-3 * latency_ms)
             self.warnings.append(
-                f"{path}: latency timer is {latency_ms} ms, so every reply takes that long; write "
-                f"1 to {timer} or add the udev rule "
-                'ACTION=="add", SUBSYSTEM=="usb-serial", DRIVER=="ftdi_sio", '
-                'ATTR{latency_timer}="1"'
+                f"{path}: latency timer is {latency_ms} ms, so every reply takes that long; set it "
+                f"(echo 1 | sudo tee {timer}), or for good put {UDEV_RULE} into "
+                "/etc/udev/rules.d/99-dynamixel-latency.rules and plug the adapter in again"
             )
+
+
+def lower_latency_timer(timer: Path) -> int | None:
+    """Set an adapter's latency timer to 1 ms if it is longer and that is allowed.
+
+    Args:
+        timer: the adapter's file ``latency_timer``.
+
+    Returns:
+        The timer in force now [ms], ``None`` if the adapter has none.
+    """
+    try:
+        latency_ms = int(timer.read_text())
+        if latency_ms > 1:
+            with contextlib.suppress(OSError):
+                timer.write_text("1")
+            latency_ms = int(timer.read_text())
+    except (OSError, ValueError):
+        return None
+    return latency_ms
 
 
 def advice(path: str, error: BaseException) -> str:

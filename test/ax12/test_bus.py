@@ -101,16 +101,16 @@ def test_a_reply_ends_a_row_of_misses(bus: Bus, servos: ScriptedServos) -> None:
     assert bus.counters[1].misses == 1
 
 
-# Each changes the right answer into one that must not pass for data.
+# Each changes the right answer into one that must not pass for data, whatever length was asked for.
 WRONG = {
     "bad checksum": lambda _, answer: answer[:-1] + bytes((answer[-1] ^ 1,)),
-    "one byte short": lambda _, answer: packet(1, 9, 0, *answer[5:12]),
+    "one byte short": lambda _, answer: packet(1, answer[3] - 1, 0, *answer[5:-2]),
     "error status without data": lambda _, answer: packet(1, 2, 8),
-    "one byte too many": lambda _, answer: packet(1, 11, 0, *answer[5:13], 0),
+    "one byte too many": lambda _, answer: packet(1, answer[3] + 1, 0, *answer[5:-1], 0),
     "truncated": lambda _, answer: answer[:9],
     "echo": lambda instruction, _: instruction,
     "echo and answer": lambda instruction, answer: instruction + answer,
-    "answer of another servo": lambda _, answer: packet(0, 10, 0, *answer[5:13]),
+    "answer of another servo": lambda _, answer: packet(0, answer[3], 0, *answer[5:-1]),
 }
 
 
@@ -140,7 +140,7 @@ def test_leading_noise_is_skipped(bus: Bus, servos: ScriptedServos) -> None:
     assert bus.read(1, 36, 8) == Reply(bytes(servos.memory[1][36:44]), 0)
 
 
-def test_a_late_answer_is_not_taken_for_the_next(bus: Bus, servos: ScriptedServos) -> None:
+def test_a_second_answer_is_not_taken_for_the_next(bus: Bus, servos: ScriptedServos) -> None:
     late = packet(1, 10, 0, *([0x55] * 8))
     servos.answer = lambda _, answer: answer + late
     bus.ping(1)
@@ -148,11 +148,74 @@ def test_a_late_answer_is_not_taken_for_the_next(bus: Bus, servos: ScriptedServo
     assert bus.read(1, 36, 8) == Reply(bytes(servos.memory[1][36:44]), 0)
 
 
+@pytest.mark.parametrize("retries", [0, 1])
+def test_an_answer_that_comes_too_late_is_passed_over(
+    retries: int, bus: Bus, servos: ScriptedServos
+) -> None:
+    held_back: list[bytes] = []
+
+    def late_once(_: bytes, answer: bytes) -> bytes:
+        if not held_back:
+            held_back.append(answer)
+            return b""
+        # By now the servo has moved.
+        servos.memory[1][36] = 7
+        return held_back[0] + packet(1, answer[3], 0, 7, *answer[6:-1])
+
+    servos.answer = late_once
+    reply = bus.read(1, 36, 8, retries=retries)
+    if retries == 0:
+        assert reply is None
+        reply = bus.read(1, 36, 8)
+    assert reply == Reply(bytes(servos.memory[1][36:44]), 0)
+    assert reply.data[0] == 7
+    assert bus.counters[1].corrupt_replies == 0
+
+
+def test_answers_that_are_late_again_and_again_are_never_believed(
+    bus: Bus, servos: ScriptedServos
+) -> None:
+    queue = [b""]
+
+    def late(_: bytes, answer: bytes) -> bytes:
+        queue.append(answer)
+        return queue.pop(0)
+
+    servos.answer = late
+    for length in (8, 6, 8, 8, 6, 6, 8, 6):
+        assert bus.read(1, 36, length, retries=0) is None
+    servos.answer = None
+    assert bus.read(1, 36, 8) == Reply(bytes(servos.memory[1][36:44]), 0)
+
+
+def test_the_wrong_servo_first_then_the_right_one(bus: Bus, servos: ScriptedServos) -> None:
+    servos.answer = lambda _, answer: packet(0, answer[3], 0, *([9] * 8)) + answer
+    assert bus.read(1, 36, 8) == Reply(bytes(servos.memory[1][36:44]), 0)
+
+
+def test_many_servos_get_several_sync_writes(bus: Bus, servos: ScriptedServos) -> None:
+    values = {servo_id: bytes((servo_id, 0, 1, 0)) for servo_id in range(100)}
+    bus.sync_write(30, values)
+    assert bus.ping(1) is not None
+    written: dict[int, bytes] = {}
+    for sent in servos.instructions(0x83):
+        assert len(sent) <= 250
+        entries = sent[7:-1]
+        written |= {entries[i]: entries[i + 1 : i + 5] for i in range(0, len(entries), 5)}
+    assert written == values
+
+
 def test_different_lengths_in_one_sync_write_are_refused(bus: Bus) -> None:
     with pytest.raises(ValueError, match="one length"):
         bus.sync_write(30, {0: b"\x00\x00", 1: b"\x00"})
     with pytest.raises(ValueError, match="one length"):
         bus.sync_write(30, {})
+
+
+def test_what_does_not_fit_a_byte_does_not_block_the_port(bus: Bus, servos: ScriptedServos) -> None:
+    with pytest.raises(ValueError, match="range"):
+        bus.read(1, 300, 8)
+    assert bus.ping(1) is not None
 
 
 def test_an_unplugged_port_is_a_bus_error_each_time(bus: Bus, servos: ScriptedServos) -> None:

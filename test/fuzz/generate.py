@@ -86,3 +86,24 @@ def frames(data: bytes) -> list[tuple[int, int, bytes]]:
         if (~sum(body)) & 0xFF == data[end - 1]:
             found.append((body[0], body[2], bytes(body[3:])))
     return found
+
+
+def of_the_wanted(
+    found: list[tuple[int, int, bytes]], asked: bytes, servo_id: int, address: int, length: int
+) -> list[tuple[bytes, int]]:
+    """What may be believed: data and error bits out of frames that answer a request.
+
+    Args:
+        found: frames, as ``frames`` returns them.
+        asked: the request; a READ may ask for more than is wanted.
+        servo_id, address, length: what is wanted; length 0 for an acknowledgement.
+    """
+    assert asked[2] == servo_id
+    start, count = (asked[5], asked[6]) if asked[4] == 2 else (address, 0)
+    assert start <= address
+    assert address + length <= start + count or count == 0
+    return [
+        (data[address - start :][:length], error)
+        for sender, error, data in found
+        if sender == servo_id and len(data) == count
+    ]

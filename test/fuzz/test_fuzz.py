@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 import serial
 
-from fuzz.driver import DriverFuzz
-from fuzz.generate import anything, frames, mutated
+from fuzz.driver import DriverFuzz, LateFuzz
+from fuzz.generate import anything, frames, mutated, of_the_wanted
 from fuzz.mock import MockFuzz
 from snake_control.ax12.bus import Bus
 from snake_control.ax12.port import SerialPort
@@ -35,6 +35,15 @@ def test_the_driver_believes_nothing_but_good_replies(seed: int) -> None:
         fuzz.step()
     assert fuzz.believed > 3000
     assert fuzz.missed > 1000
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_no_late_reply_is_taken_for_the_next_one(seed: int) -> None:
+    fuzz = LateFuzz(seed)
+    for _ in range(10_000):
+        fuzz.step()
+    assert fuzz.believed > 3000
+    assert fuzz.late > 1000
 
 
 def test_a_good_frame_is_found_and_a_bad_one_is_not() -> None:
@@ -64,8 +73,11 @@ def test_a_few_thousand_packets_over_a_real_port_leave_the_mock_well(tmp_path: P
 def test_a_few_thousand_spoilt_replies_over_a_real_port_do_no_harm() -> None:
     rng = random.Random(4)
     sent: list[bytes] = []
+    asked = b""
 
     def spoil(instruction: bytes, answer: bytes) -> bytes:
+        nonlocal asked
+        asked = instruction
         spoilt = mutated(rng, answer) if rng.random() < 0.5 else answer
         sent.append(spoilt)
         del sent[:-4]
@@ -83,6 +95,6 @@ def test_a_few_thousand_spoilt_replies_over_a_real_port_do_no_harm() -> None:
             if reply is not None:
                 believed += 1
                 line = b"".join(sent)
-                assert (servo_id, reply.error_bits, reply.data) in frames(line)
+                assert reply in of_the_wanted(frames(line), asked, servo_id, 36, 8)
         bus.close()
     assert 800 < believed < 2000

@@ -51,6 +51,7 @@ class MemoryPort(PortHandler):
     Attributes:
         reply_timeout_s: beyond the time on the wire, as ``ax12.port.SerialPort`` has it.
         received: what was read since somebody emptied it.
+        sent: the packet written last.
         alter: makes something else of the bytes that arrive (they are as a list of time, bytes).
     """
 
@@ -58,7 +59,7 @@ class MemoryPort(PortHandler):
         super().__init__("memory")
         self.reply_timeout_s = reply_timeout_s
         self.alter: Callable[[list[tuple[float, bytes]]], list[tuple[float, bytes]]] | None = None
-        self.received = b""
+        self.received = self.sent = b""
         self.is_open = True
         self._world = world
         self._coming: list[tuple[float, bytes]] = []
@@ -78,6 +79,7 @@ class MemoryPort(PortHandler):
 
     def writePort(self, packet: list[int]) -> int:
         now = self._world.now
+        self.sent = bytes(packet)
         replies = self._world.line.receive(bytes(packet), now, self.baudrate)
         arriving = [(reply.at, reply.data) for reply in replies]
         if self.alter is not None:
