@@ -28,6 +28,8 @@ _WATCHED = ct.TORQUE_LIMIT.end - _RAM
 
 _STILL_TICKS = 6
 _SETTLE_TRIES = 3
+_STEADY_READINGS, _STEADY_TRIES = 4, 8
+_UNSTEADY = "it does not stand still, or its readings jump"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -191,7 +193,10 @@ def _seed(bus: Bus, joint: JointSetup, servo: ServoInfo, before: _Before) -> See
         bus.write_verified(joint.servo_id, ct.CW_COMPLIANCE_MARGIN.address, _compliance(joint))
     else:
         position = ct.PRESENT_POSITION.decode(before.ram, _RAM)
-        goal = _goal_to_hold(joint, servo, before, position)
+        kept = _goal_to_keep(joint, servo, before, position)
+        if before.holds and kept is None:
+            position = _steady_position(bus, joint)
+        goal = position if kept is None else kept
         _require_possible(joint, servo, position, goal)
         seed = Seed(goal, ticks_to_rad(goal), ticks_to_rad(position), before.holds)
         motion = _compliance(joint) + ct.GOAL_POSITION.encode(goal)
@@ -199,16 +204,32 @@ def _seed(bus: Bus, joint: JointSetup, servo: ServoInfo, before: _Before) -> See
         address = ct.CW_COMPLIANCE_MARGIN.address
     # One packet: the goal must not be in force with a speed or a compliance not meant for it.
     bus.write_verified(joint.servo_id, address, motion)
-    bus.write_verified(joint.servo_id, ct.PUNCH.address, ct.PUNCH.encode(joint.punch_raw))
+    _set_punch(bus, joint, before.ram)
     return seed
 
 
-def _goal_to_hold(joint: JointSetup, servo: ServoInfo, before: _Before, position: int) -> int:
-    at_rest = decode_signed(ct.PRESENT_SPEED.decode(before.ram, _RAM)) == 0
-    kept = (
-        _goal_that_holds(joint, servo, before.ram, position) if before.holds and at_rest else None
-    )
-    return position if kept is None else kept
+def _set_punch(bus: Bus, joint: JointSetup, ram: bytes) -> None:
+    # Of what is set here only the punch lies where Lock forbids it, whatever its value.
+    if ct.LOCK.decode(ram, _RAM) == 0:
+        bus.write_verified(joint.servo_id, ct.PUNCH.address, ct.PUNCH.encode(joint.punch_raw))
+    elif ct.PUNCH.decode(ram, _RAM) != joint.punch_raw:
+        raise ServoError(
+            [
+                "is locked (Lock, address 47), so that its punch cannot be set: switch its power "
+                "off and on"
+            ]
+        )
+
+
+def _goal_to_keep(
+    joint: JointSetup, servo: ServoInfo, before: _Before, position: int
+) -> int | None:
+    speed = decode_signed(ct.PRESENT_SPEED.decode(before.ram, _RAM))
+    ahead = ct.GOAL_POSITION.decode(before.ram, _RAM) - position
+    # One that a load pushes away is to be held against it; one on its way is to stop.
+    if not before.holds or speed * ahead > 0:
+        return None
+    return _goal_that_holds(joint, servo, before.ram, position)
 
 
 def _goal_that_holds(joint: JointSetup, servo: ServoInfo, ram: bytes, position: int) -> int | None:
@@ -218,22 +239,32 @@ def _goal_that_holds(joint: JointSetup, servo: ServoInfo, ram: bytes, position: 
     ``None`` if where it rests does not tell its load, or that goal is not allowed.
     """
     goal = ct.GOAL_POSITION.decode(ram, _RAM)
-    found = Compliance.found(ram, _RAM, goal > position)
+    load = decode_signed(ct.PRESENT_LOAD.decode(ram, _RAM))
+    side = 1 if (goal - position or load) > 0 else -1
+    found = Compliance.found(ram, _RAM, side > 0)
     wanted = Compliance.configured(joint, _torque_limit(joint, servo))
-    distance: float = abs(goal - position)
-    if found != wanted:
-        output = found.output_at(distance)
-        if math.isnan(output):
-            return None
-        distance = (
-            min(distance, wanted.distance_at(output))
-            if output == 0
-            else (wanted.distance_at(output))
-        )
-    elif distance > wanted.margin_ticks + wanted.slope_ticks:
+    distance = abs(goal - position)
+    if found == wanted:
+        kept = goal if distance <= wanted.margin_ticks + wanted.slope_ticks else None
+    else:
+        kept = _same_output(found, wanted, goal, side, distance, side * load)
+    return kept if kept is not None and servo.goal_allowed(kept) else None
+
+
+def _same_output(
+    found: Compliance, wanted: Compliance, goal: int, side: int, distance: int, load: int
+) -> int | None:
+    """Return the goal at which other settings give the same output, ``None`` if it is not known."""
+    output = found.output_near(distance, load)
+    if math.isnan(output):
         return None
-    kept = position + round(math.copysign(distance, goal - position))
-    return kept if servo.goal_allowed(kept) else None
+    # Within half a tick the output tells where the joint is.
+    exact = distance if output == 0 else found.distance_at(output)
+    exact = min(max(exact, distance - 0.5), distance + 0.5)
+    needed = wanted.distance_at(output)
+    if output == 0:
+        needed = min(exact, needed)
+    return goal + round(side * (needed - exact))
 
 
 def _torque_limit(joint: JointSetup, servo: ServoInfo) -> int:
@@ -252,15 +283,32 @@ def _require_possible(joint: JointSetup, servo: ServoInfo, position: int, goal: 
         )
 
 
+def _read_position(bus: Bus, joint: JointSetup) -> int:
+    at = ct.PRESENT_POSITION.address
+    reply = bus.read(joint.servo_id, at, ct.PRESENT_POSITION.size)
+    if reply is None:
+        raise ServoError(["does not answer"])
+    return ct.PRESENT_POSITION.decode(reply.data, at)
+
+
+def _steady_position(bus: Bus, joint: JointSetup) -> int:
+    """Return where a joint is; nonsense that its sensor's dead zone gives hardly ever agrees."""
+    position, agreeing = _read_position(bus, joint), 1
+    for _ in range(_STEADY_TRIES):
+        if agreeing == _STEADY_READINGS:
+            return position
+        again = _read_position(bus, joint)
+        agreeing = agreeing + 1 if abs(again - position) <= _STILL_TICKS else 1
+        position = again
+    raise ServoError([_UNSTEADY])
+
+
 def _settle(bus: Bus, joint: JointSetup, servo: ServoInfo, seed: Seed) -> Seed:
     """Return the seed of a joint that is free until now, for where it is by now."""
     if seed.had_torque or joint.mode == WHEEL_MODE:
         return seed
     for _ in range(_SETTLE_TRIES):
-        reply = bus.read(joint.servo_id, ct.PRESENT_POSITION.address, ct.PRESENT_POSITION.size)
-        if reply is None:
-            raise ServoError(["does not answer"])
-        position = ct.PRESENT_POSITION.decode(reply.data, ct.PRESENT_POSITION.address)
+        position = _steady_position(bus, joint)
         _require_possible(joint, servo, position, position)
         if abs(position - seed.goal_ticks) <= _STILL_TICKS:
             return seed
@@ -268,7 +316,7 @@ def _settle(bus: Bus, joint: JointSetup, servo: ServoInfo, seed: Seed) -> Seed:
         bus.write_verified(joint.servo_id, ct.GOAL_POSITION.address, goal)
         angle = ticks_to_rad(position)
         seed = dataclasses.replace(seed, goal_ticks=position, angle=angle, measured=angle)
-    raise ServoError(["it does not stand still, or its readings jump"])
+    raise ServoError([_UNSTEADY])
 
 
 def _compliance(joint: JointSetup) -> bytes:

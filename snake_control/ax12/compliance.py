@@ -13,6 +13,8 @@ from snake_control.ax12 import control_table as ct
 from snake_control.ax12.joint import JointSetup
 from snake_control.ax12.units import compliance_step
 
+_HALF_TICK = 0.5
+
 
 @dataclasses.dataclass(frozen=True)
 class Compliance:
@@ -62,6 +64,25 @@ class Compliance:
         if beyond > self.slope_ticks:
             return math.nan
         return self.punch_raw + self._rise * beyond / self.slope_ticks
+
+    def output_near(self, distance_ticks: float, seen_raw: float) -> float:
+        """Return the output that a servo reports, as far as its distance from the goal allows it.
+
+        Positions come in whole ticks, and at the edge of the margin the output jumps to the punch:
+        the distance alone does not tell what the servo gives.
+
+        Args:
+            distance_ticks: whole ticks.
+            seen_raw: what it reports (Present Load), of 1023.
+
+        Returns:
+            The output, of 1023; NaN beyond the slope.
+        """
+        if math.isnan(self.output_at(distance_ticks)):
+            return math.nan
+        least = self.output_at(max(distance_ticks - _HALF_TICK, 0.0))
+        most = self.output_at(distance_ticks + _HALF_TICK)
+        return min(max(seen_raw, least), self.limit_raw if math.isnan(most) else most)
 
     def distance_at(self, output_raw: float) -> float:
         """Return the distance from the goal at which an output is given [ticks].
