@@ -23,8 +23,8 @@ help:
 	  'make test    lint, then all tests' \
 	  'make lint    style, types and the import rules' \
 	  'make bench   time control step, dynamics and lockstep; results in out/bench.json' \
-  'make faults  try driver and mock with every fault; table in out/faults.md  SCENARIO=name for one' \
-  'make fuzz    a million random packets against the mock and the driver  PACKETS=n' \
+	  'make faults  try driver and mock with every fault; table in out/faults.md  SCENARIO=name for one' \
+	  'make fuzz    a million random packets against the mock and the driver  PACKETS=n' \
 	  'make clean   remove all that the others made' \
 	  '' \
 	  'Each does the set-up that it needs, once: packages in .venv, messages in install.' \
@@ -65,7 +65,7 @@ demo: build/ready
 	  --case $(CASE) --duration $(DURATION) --seed $(SEED) --out out/demo
 
 test: lint build/ready
-	@. scripts/env.sh && python -m pytest
+	@exec bash scripts/test.sh
 
 lint: .venv/ready
 	@bash scripts/lint.sh

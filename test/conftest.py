@@ -9,21 +9,21 @@ from pathlib import Path
 
 import pytest
 
-_REAL_TIME = ("nodes", "cli", "faults")
+_REAL_TIME = ("nodes", "cli", "faults", "launch_files")
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Give tests of whole processes in real time a second try, which the report shows.
+    """Mark tests of whole processes in real time, and give them a second try, which is shown.
 
     A busy machine may withhold the processor for longer than a watchdog allows; the nodes are right
     to stop then, and the test has shown nothing.
     """
-    if not config.pluginmanager.hasplugin("rerunfailures"):
-        return
     here = Path(__file__).parent
     for item in items:
         if item.path.relative_to(here).parts[0] in _REAL_TIME:
-            item.add_marker(pytest.mark.flaky(reruns=1))
+            item.add_marker(pytest.mark.real_time)
+            if config.pluginmanager.hasplugin("rerunfailures"):
+                item.add_marker(pytest.mark.flaky(reruns=1))
 
 
 @pytest.fixture

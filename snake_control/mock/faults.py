@@ -367,4 +367,4 @@ def _twin(servo: Servo) -> Servo:
     """Return a second servo as it comes from the bench: same id and rate, its own shaft."""
     names = ("baud_rate", "return_delay_time", "status_return_level")
     eeprom = {name: servo.registers[name] for name in names}
-    return Servo(servo.id, servo.parameters, angle_rad=0.3, eeprom=eeprom)
+    return Servo(servo.id, servo.parameters, model=servo.model, angle_rad=0.3, eeprom=eeprom)

@@ -36,6 +36,7 @@ class Servo:
 
     Attributes:
         parameters: what it is made of.
+        model: which of the AX servos it is.
         registers: the control table; change it through ``store`` or ``store_bytes``.
         motion: state of the shaft.
         health: temperature and overload.
@@ -69,6 +70,7 @@ class Servo:
         Raises:
             ValueError: a register that is no EEPROM, or a value outside its range.
         """
+        self.model = model
         self.parameters = parameters or ServoParameters(motor=model.motor)
         self.registers = RegisterFile({**model.defaults, "model_number": model.number})
         for name, value in {"id": servo_id, **(eeprom or {})}.items():

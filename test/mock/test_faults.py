@@ -8,6 +8,7 @@ import pytest
 from snake_control.mock.bus import Bus
 from snake_control.mock.fault_kinds import KINDS, Concerns
 from snake_control.mock.faults import Fault, FaultError, Injector
+from snake_control.mock.models import AX_18A
 from snake_control.mock.servo import Servo
 from support.packets import BROADCAST, PING, READ, SYNC_WRITE, WRITE, instruction, status, word
 
@@ -231,6 +232,12 @@ def test_two_servos_with_one_id_garble_each_other(rig):
     rig.faults.clear()
     assert (good, len(rig.bus.servos)) == (4, 3)
     assert rig.ping(3) == status(3)
+
+
+def test_a_servo_of_the_same_id_is_of_the_same_model(rig):
+    rig.bus.servos = (Servo(1, model=AX_18A),)
+    rig.inject("duplicate_id", 1)
+    assert [s.registers["model_number"] for s in rig.bus.servos] == [18, 18]
 
 
 def test_the_adapter_is_pulled_out_for_a_time(rig):
