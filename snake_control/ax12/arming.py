@@ -27,8 +27,8 @@ _RAM_LENGTH = ct.TABLE_END - _RAM
 _WATCHED = ct.TORQUE_LIMIT.end - _RAM
 
 _STILL_TICKS = 6
-_SETTLE_TRIES = 3
-_STEADY_READINGS, _STEADY_TRIES = 4, 8
+_SETTLE_TRIES = 4
+_STEADY_READINGS, _STEADY_TRIES = 4, 16
 _UNSTEADY = "it does not stand still, or its readings jump"
 
 
@@ -307,8 +307,10 @@ def _settle(bus: Bus, joint: JointSetup, servo: ServoInfo, seed: Seed) -> Seed:
     """Return the seed of a joint that is free until now, for where it is by now."""
     if seed.had_torque or joint.mode == WHEEL_MODE:
         return seed
+    _steady_position(bus, joint)
+    # It may be falling: from here on every moment counts.
     for _ in range(_SETTLE_TRIES):
-        position = _steady_position(bus, joint)
+        position = _read_position(bus, joint)
         _require_possible(joint, servo, position, position)
         if abs(position - seed.goal_ticks) <= _STILL_TICKS:
             return seed
