@@ -2,9 +2,9 @@
 
 Lifecycle: configure opens the port and checks every servo, activate seeds and arms them, deactivate
 lets them hold, cleanup takes the torque and closes the port; after an error the servos hold by
-themselves and the port is closed. With ``autostart`` (default) configure and activate happen in the
-first turns of the executor, so that a signal comes between them, and a failure ends the process
-with one message.
+themselves and the port is closed. With ``autostart`` (default) configure and activate happen one
+after the other as soon as the executor turns, while it answers already; a signal comes between
+them, and a failure ends the process with one message.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import math
 import sys
 import time
 from collections.abc import Callable
+from concurrent.futures import Future
 from typing import Any
 
 from rclpy.clock import Clock, ClockType
@@ -46,6 +47,7 @@ _THREAD_SWITCH_S = 5e-4
 
 _LOG_PERIOD_S = 1.0
 _CHECK_PERIOD_S = 0.2
+_START_PERIOD_S = 0.01
 _NS = 1_000_000_000
 _MOVING_RAD = 0.02
 
@@ -102,7 +104,8 @@ class BusDriver(ManagedNode):
         self.create_timer(_CHECK_PERIOD_S, self._loop.check, clock=steady)
         if driver.autostart:
             self._steps = iter((self.trigger_configure, self.trigger_activate))
-            self._starter = self.create_timer(0.0, self._start_step, clock=steady)
+            self._step: Future[TransitionCallbackReturn] | None = None
+            self._starter = self.create_timer(_START_PERIOD_S, self._start_step, clock=steady)
 
     def close(self) -> None:
         """Hold, switch torque off if configured, close the port.
@@ -192,17 +195,21 @@ class BusDriver(ManagedNode):
         return TransitionCallbackReturn.SUCCESS
 
     def _start_step(self) -> None:
-        """Configure at the first call, activate at the second.
+        """Configure, then activate, each in the thread for requests.
 
         Raises:
             BusError, ServoError: it failed; no servo was armed.
         """
-        step = next(self._steps, None)
-        if step is not None:
-            if step() != TransitionCallbackReturn.SUCCESS:
+        if self._step is not None:
+            if not self._step.done():
+                return
+            if self._step.result() != TransitionCallbackReturn.SUCCESS:
                 self._starter.cancel()
                 assert self._failure is not None
                 raise self._failure
+        step = next(self._steps, None)
+        if step is not None:
+            self._step = self.begin(step)
             return
         self._starter.cancel()
         self._starting = False

@@ -69,9 +69,13 @@ class ManagedNode(LifecycleNode):
             service.type, service.name, self._in_background(callback), callback_group=self._slow
         )
 
+    def begin(self, action: Callable[[], _Result]) -> Future[_Result]:
+        """Do something in the thread for what takes its time, after what is under way there."""
+        return self._worker.submit(action)
+
     def finish(self, action: Callable[[], None]) -> None:
         """Do the last work of the node after what is under way, and answer requests meanwhile."""
-        done = self._worker.submit(action)
+        done = self.begin(action)
         wait([done], _SOON_S)
         try:
             while not done.done() and self.executor is not None and self.context.ok():

@@ -19,7 +19,9 @@ from lifecycle_msgs.srv import ChangeState, GetState
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 from snake_interfaces.msg import BusState
+from std_srvs.srv import Trigger
 
+from snake_control.errors import SnakeError
 from snake_control.nodes import topics
 from snake_control.nodes.bus_driver import BusDriver
 from support.driven_robot import DrivenRobot
@@ -92,9 +94,9 @@ def test_an_emergency_stop_ends_the_lowering_of_a_driver_that_ends(tmp_path: Pat
 
 
 @contextmanager
-def driver_on(graph: Graph, port: str) -> Iterator[BusDriver]:
+def driver_on(graph: Graph, port: str, *, autostart: bool = False) -> Iterator[BusDriver]:
     """A driver in this process, so that a test can break it, with an executor of its own."""
-    given = {"port": port, "autostart": False}
+    given = {"port": port, "autostart": autostart}
     driver = BusDriver(
         context=graph.node.context,
         parameter_overrides=[Parameter(name, value=value) for name, value in given.items()],
@@ -114,10 +116,12 @@ def driver_on(graph: Graph, port: str) -> Iterator[BusDriver]:
             yield driver
         finally:
             stop.set()
-            spinning.result()
-            driver.close()
-            driver.destroy_node()
-            executor.shutdown()
+            try:
+                spinning.result()
+            finally:
+                driver.close()
+                driver.destroy_node()
+                executor.shutdown()
 
 
 def changed(graph: Graph, number: int) -> bool:
@@ -178,3 +182,24 @@ def test_the_driver_answers_while_it_waits_for_servos_that_are_silent() -> None:
             graph.wait_for(configured.done, 20.0, "the end of the check")
             assert not configured.result().success
         assert servos.instructions(WRITE) == servos.instructions(SYNC_WRITE) == []
+
+
+def test_the_driver_answers_while_it_starts_by_itself() -> None:
+    asked = threading.Event()
+
+    def silent(instruction: bytes, answer: bytes) -> bytes:
+        asked.set()
+        return b""
+
+    def start(graph: Graph, port: str) -> None:
+        with driver_on(graph, port, autostart=True) as driver:
+            assert graph.call("bus_driver", topics.EMERGENCY_STOP, Trigger.Request()).success
+            assert asked.is_set()
+            assert not driver._step.done(), "it still looks for eleven servos, 0.2 s each"
+            graph.wait_for(driver._step.done, 20.0, "the end of the start")
+            graph.wait_for(lambda: driver._starter.is_canceled(), 5.0, "the failure to be raised")
+
+    with ScriptedServos(range(1, 12)) as servos, Graph() as graph:
+        servos.answer = silent
+        with pytest.raises(SnakeError, match="answer"):
+            start(graph, servos.path)
