@@ -129,7 +129,7 @@ class LateFuzz:
 
     def _delay(self, replies: list[tuple[float, bytes]]) -> list[tuple[float, bytes]]:
         rng = self._rng
-        self._number += 1
+        self._number = (self._number + 1) % 65536
         found = []
         for at, data in replies:
             # Twice the number and no more: the shortest read is of four bytes.
