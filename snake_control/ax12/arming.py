@@ -295,11 +295,10 @@ def _steady_position(bus: Bus, joint: JointSetup) -> int:
     """Return where a joint is; nonsense that its sensor's dead zone gives hardly ever agrees."""
     position, agreeing = _read_position(bus, joint), 1
     for _ in range(_STEADY_TRIES):
+        before, position = position, _read_position(bus, joint)
+        agreeing = agreeing + 1 if abs(position - before) <= _STILL_TICKS else 1
         if agreeing == _STEADY_READINGS:
             return position
-        again = _read_position(bus, joint)
-        agreeing = agreeing + 1 if abs(again - position) <= _STILL_TICKS else 1
-        position = again
     raise ServoError([_UNSTEADY])
 
 

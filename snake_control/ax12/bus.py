@@ -4,7 +4,7 @@ The SDK does not compare a reply's length with the request, so a short or an ech
 pass for data; here a reply counts only if it is as long as asked. A reply that does not come is
 a value (``None``), not an exception: the caller decides how many misses matter.
 
-A late reply must not pass for the next one: see ``requests``.
+A late reply must not pass for data of the next one: see ``requests``.
 """
 
 from __future__ import annotations

@@ -2,6 +2,7 @@
 
 A status packet carries no number: a reply that comes late looks like that to the next request. What
 differs is its length. So a servo that owes a reply is asked for a few bytes more than needed.
+Replies without data (to PING and WRITE) cannot be told apart: what matters is read back.
 """
 
 from __future__ import annotations

@@ -143,9 +143,9 @@ def move(chain: ServoChain, seconds: float) -> str:
 def test_replies_that_nobody_believes_stop_the_robot(
     chain: ServoChain, servos: ScriptedServos
 ) -> None:
+    begin = time.monotonic()
     chain.arm()
     servos.memory[1][36:38] = (2047).to_bytes(2, "little")
-    begin = time.monotonic()
     assert move(chain, 20.0) == "no believable reading for 0.5 s from joint_1 (servo id 1)"
     assert time.monotonic() - begin >= 0.5
     goal = int.from_bytes(servos.memory[1][30:32], "little")

@@ -233,6 +233,29 @@ def test_a_joint_that_sags_out_of_its_sensors_sight_is_refused_and_held_as_it_wa
     assert servo.registers["goal_position"] == 1009
 
 
+def test_a_joint_that_a_load_pushes_away_keeps_its_goal() -> None:
+    servo = Servo(1)
+    world, chain = single(servo)
+    chain.arm()
+    world.loads = [-0.45]
+    world.pass_until(world.now + 0.02)
+    assert servo.motion.speed_rad_s > 0.1
+    chain.arm()
+    assert servo.registers["goal_position"] == 512
+
+
+def test_a_joint_on_its_way_stops_where_it_is() -> None:
+    servo = Servo(1)
+    world, chain = single(servo)
+    chain.arm()
+    servo.store("moving_speed", 100)
+    servo.store("goal_position", 532)
+    world.pass_until(world.now + 0.03)
+    assert servo.motion.speed_rad_s > 0.1
+    chain.arm()
+    assert 512 <= servo.registers["goal_position"] < 525
+
+
 def test_a_locked_servo_that_needs_another_punch_is_refused_with_what_to_do() -> None:
     servo = Servo(1)
     servo.store("punch", 100)

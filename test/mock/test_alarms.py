@@ -9,25 +9,14 @@ from snake_control.mock.firmware import execute
 from snake_control.mock.parameters import ServoParameters, Shutdown
 from snake_control.mock.protocol import BROADCAST_ID, ErrorBit, InstructionPacket
 from snake_control.mock.servo import Servo
+from support.mock_servo import STEP_S, holding, run
 from support.packets import ACTION, PING, SYNC_WRITE, WRITE, word
 
 OK = ErrorBit.NONE
-STEP_S = 0.01
 WHEEL = {"cw_angle_limit": 0, "ccw_angle_limit": 0}
 BLOCKED = Disturbance(shaft_blocked=True)
 # Torque of the full output at the default supply, and the gear's friction.
 STALL_NM, FRICTION_NM = 1.5 * 11.1 / 12.0, 0.1
-
-
-def holding(parameters: ServoParameters | None = None, **eeprom: int) -> Servo:
-    servo = Servo(1, parameters, eeprom=eeprom)
-    servo.store("torque_enable", 1)
-    return servo
-
-
-def run(servo: Servo, seconds: float, load_nm: float = 0.0) -> None:
-    for _ in range(round(seconds / STEP_S)):
-        servo.step(STEP_S, load_nm)
 
 
 def tell(servo: Servo, code: int, *parameters: int, to: int = 1) -> ErrorBit | None:

@@ -5,21 +5,10 @@ from snake_control.mock.health import Health, HealthParameters
 from snake_control.mock.parameters import ServoParameters, Shutdown
 from snake_control.mock.protocol import ErrorBit, InstructionPacket
 from snake_control.mock.servo import Servo
+from support.mock_servo import STEP_S, holding, run
 from support.packets import WRITE, word
 
 OK = ErrorBit.NONE
-STEP_S = 0.01
-
-
-def holding(parameters: ServoParameters | None = None, **eeprom: int) -> Servo:
-    servo = Servo(1, parameters, eeprom=eeprom)
-    servo.store("torque_enable", 1)
-    return servo
-
-
-def run(servo: Servo, seconds: float, load_nm: float = 0.0) -> None:
-    for _ in range(round(seconds / STEP_S)):
-        servo.step(STEP_S, load_nm)
 
 
 def write(servo: Servo, address: int, *data: int) -> None:

@@ -8,9 +8,9 @@ from snake_control.mock.bus import Bus
 from snake_control.mock.firmware import execute
 from snake_control.mock.protocol import BROADCAST_ID, ErrorBit, InstructionPacket
 from snake_control.mock.servo import Servo
+from support.mock_servo import STEP_S, run
 from support.packets import ACTION, PING, READ, REG_WRITE, WRITE, instruction, word
 
-STEP_S = 0.01
 TICK_RAD = math.radians(300 / 1023)
 
 
@@ -19,11 +19,6 @@ def driven(**values: int) -> Servo:
     for name, value in ({"torque_enable": 1} | values).items():
         servo.store(name, value)
     return servo
-
-
-def run(servo: Servo, seconds: float, load_nm: float = 0.0) -> None:
-    for _ in range(round(seconds / STEP_S)):
-        servo.step(STEP_S, load_nm)
 
 
 @pytest.mark.parametrize("to", [1, BROADCAST_ID])
