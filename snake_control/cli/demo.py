@@ -59,10 +59,6 @@ _BUS_STATES = {
 }
 
 
-# Moving too: the controller commands zeros while it waits for a reference.
-_READY = (BusState.STATE_HOLDING, BusState.STATE_MOVING)
-
-
 class StopRequested(Exception):  # noqa: N818 - not an error: somebody pressed Ctrl-C
     """SIGINT or SIGTERM arrived.
 
@@ -184,11 +180,6 @@ class Demo:
                 raise NotReadyError(what, _READY_TIMEOUT_S, found())
 
         wait(
-            "bus_driver to hold all joints",
-            lambda: recorder.bus is not None and recorder.bus.state in _READY,
-            lambda: _bus_text(recorder.bus),
-        )
-        wait(
             "a valid head pose",
             lambda: recorder.head is not None and recorder.head.status == PoseStatus.STATUS_VALID,
             lambda: f"pose_input says: {recorder.head.text if recorder.head else 'nothing'}",
@@ -200,6 +191,13 @@ class Demo:
                 "scp_controller says: "
                 + (recorder.controller.text if recorder.controller else "nothing")
             ),
+        )
+        # The controller commands zeros until there is a reference. A driver that has just been
+        # started wants one before it takes motion.
+        wait(
+            "bus_driver to take commands",
+            lambda: recorder.bus is not None and recorder.bus.state == BusState.STATE_MOVING,
+            lambda: _bus_text(recorder.bus),
         )
 
     def _watch(self, recorder: Recorder) -> Outcome:

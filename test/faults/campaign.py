@@ -29,7 +29,7 @@ def run(scenarios: Sequence[Scenario], tries: int = 2) -> list[tuple[Scenario, O
                     outcome = Outcome(violations=[f"not carried out: {error}".splitlines()[0]])
                 if not outcome.violations:
                     break
-                words = "; ".join(outcome.violations)
+                words = str(outcome).replace("\n", "\n    ")
                 print(f"  {scenario.name}, try {attempt}: {words}", flush=True)
             found.append((scenario, outcome))
             result = "VIOLATED" if outcome.violations else "ok"

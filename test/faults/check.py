@@ -62,6 +62,8 @@ class Outcome:
             from the stop (the others) on [rad].
         recovered: what brought motion back; empty if nothing had to, "no" if nothing did.
         violations: what must not be.
+        stalled_s: how long the simulated robot stood still in the time that was watched [s].
+        timeline: what was heard around the fault, for whoever looks for the cause of a violation.
     """
 
     did: str = ""
@@ -69,6 +71,22 @@ class Outcome:
     travel: float = math.nan
     recovered: str = ""
     violations: list[str] = dataclasses.field(default_factory=list)
+    stalled_s: float = 0.0
+    timeline: list[str] = dataclasses.field(default_factory=list)
+
+    def __str__(self) -> str:
+        """Violations with all that was heard, or that there are none."""
+        return "\n".join([*self.violations, *self.timeline]) if self.violations else "holds"
+
+
+def stalled(record: Record) -> float:
+    """Return how long the simulated robot stood still in the time that was watched [s].
+
+    The mock leaves out most of the time in which its machine withholds the processor: a record with
+    such a gap is of no robot.
+    """
+    watched = record.time[record.time >= record.fault_at]
+    return float(np.diff(watched, prepend=record.fault_at, append=record.until).max())
 
 
 def timeouts(config: Config) -> dict[str, float]:
@@ -106,7 +124,7 @@ def look_ahead_bound(config: Config, speed: Array) -> Array:
 
 def judge(scenario: Scenario, record: Record, config: Config) -> Outcome:
     """Return the outcome with every criterion that does not hold."""
-    outcome = Outcome()
+    outcome = Outcome(stalled_s=stalled(record), timeline=_timeline(record))
     wrong = outcome.violations
     wrong += [f"{name} died" for name in record.died]
     _check_ranges(scenario, record, config, wrong)
@@ -128,6 +146,25 @@ def judge(scenario: Scenario, record: Record, config: Config) -> Outcome:
     _check_rest(scenario, record, config, outcome, bool(stops))
     _check_travel(scenario, record, config, outcome, stops[0][0] if stops else None)
     return outcome
+
+
+def _timeline(record: Record) -> list[str]:
+    """One line for each new text and state, and the time of the last motion of each joint."""
+    lines = []
+    said: dict[bool, str] = {}
+    for t, state, text in record.states:
+        driver = state >= 0
+        words = f"{state} {text.split(' | ')[0]}" if driver else text
+        if t >= record.fault_at - 0.1 and said.get(driver) != words:
+            said[driver] = words
+            who = "driver" if driver else "controller"
+            lines.append(f"{t - record.fault_at:+.3f} s {who}: {words}")
+    moving = np.abs(record.phi_dot) > AT_REST_RAD_S
+    for i in range(moving.shape[1]):
+        if moving[:, i].any():
+            last = record.time[moving[:, i]][-1] - record.fault_at
+            lines.append(f"{last:+.3f} s joint_{i + 1} moved last")
+    return [*lines, f"simulated time stood still for at most {stalled(record):.3f} s"]
 
 
 def _did(

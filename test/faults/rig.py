@@ -18,6 +18,7 @@ from snake_interfaces.msg import BusState
 from faults.check import Outcome, Record, judge
 from faults.scenario import After, Expect, Scenario
 from snake_control.config import Config, load
+from snake_control.mock.simulation import LARGEST_LAG_S
 from snake_control.nodes import topics
 from snake_control.nodes.recorder import FOLLOWING
 from support.driven_robot import NAMES, DrivenRobot, stamp
@@ -32,6 +33,7 @@ SPEEDS = {"joint_2": 0.15, "joint_6": 0.2, "joint_7": 0.15, "joint_8": 0.4, "joi
 
 SWING_RAD = 0.8
 _WARM_UP_S = 0.8
+_TRIES = 3
 
 
 class Rig:
@@ -52,7 +54,19 @@ class Rig:
         self._directory.cleanup()
 
     def run(self, scenario: Scenario) -> Outcome:
-        """Try a scenario and judge it."""
+        """Try a scenario and judge it; once more where the machine stalled, as that shows nothing.
+
+        Of a mock that is itself stopped nothing else can be expected.
+        """
+        for _ in range(_TRIES):
+            outcome = self._run(scenario)
+            stalled = scenario.process != "mock_bus" and outcome.stalled_s > LARGEST_LAG_S
+            if not (outcome.violations and stalled):
+                break
+            self._stop()
+        return outcome
+
+    def _run(self, scenario: Scenario) -> Outcome:
         if scenario.situation == "case_3":
             self._stop()
             return self._run_whole_graph(scenario)

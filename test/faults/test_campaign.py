@@ -23,4 +23,5 @@ def rig() -> Iterator[Rig]:
 
 @pytest.mark.parametrize("scenario", SHORT, ids=lambda scenario: scenario.name)
 def test_the_robot_stays_safe_says_why_and_comes_back(rig: Rig, scenario: Scenario) -> None:
-    assert rig.run(scenario).violations == []
+    outcome = rig.run(scenario)
+    assert not outcome.violations, str(outcome)

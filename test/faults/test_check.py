@@ -89,6 +89,28 @@ def test_a_joint_that_goes_on_after_the_stop_is_found() -> None:
     assert any(wrong.startswith("joint_8 went") for wrong in found.violations)
 
 
+def test_a_record_in_which_time_stood_still_is_known() -> None:
+    whole = record()
+    assert judge(STOPS, whole, ROBOT).stalled_s == pytest.approx(0.02, abs=0.011)
+    kept = (whole.time < 100.2) | (whole.time > 100.6)
+    gap = dataclasses.replace(
+        whole, time=whole.time[kept], phi=whole.phi[kept], phi_dot=whole.phi_dot[kept]
+    )
+    assert judge(STOPS, gap, ROBOT).stalled_s == pytest.approx(0.44, abs=0.03)
+    early = whole.time < 101.0
+    cut = dataclasses.replace(
+        whole, time=whole.time[early], phi=whole.phi[early], phi_dot=whole.phi_dot[early]
+    )
+    assert judge(STOPS, cut, ROBOT).stalled_s == pytest.approx(1.0, abs=0.03)
+
+
+def test_a_violation_comes_with_what_was_heard() -> None:
+    shown = str(judge(STOPS, record(text="something else"), ROBOT))
+    assert "not reported" in shown
+    assert "+0.500 s driver: 4 something else" in shown
+    assert "+0.500 s joint_8 moved last" in shown
+
+
 def test_the_campaign_has_every_fault_and_every_process() -> None:
     scenarios = load()
     assert len(scenarios) >= 40

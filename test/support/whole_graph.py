@@ -14,8 +14,6 @@ from snake_control.nodes import topics
 from snake_control.nodes.conversions import header, stamp_ns, vector
 from support.graph import CONFIG, Graph
 
-_READY = (BusState.STATE_HOLDING, BusState.STATE_MOVING)
-
 
 class WholeGraph:
     """Context manager around the five nodes, ready to follow references.
@@ -54,7 +52,6 @@ class WholeGraph:
                 )
                 if kind == "mock_bus":
                     graph.wait_for(self._port.exists, 30.0, "the port of the mock")
-            graph.wait_for(lambda: bus.last and bus.last.state in _READY, 40.0, "the bus driver")
             graph.wait_for(
                 lambda: head.last and head.last.status == PoseStatus.STATUS_VALID,
                 20.0,
@@ -68,6 +65,12 @@ class WholeGraph:
                 ),
                 20.0,
                 "the controller waiting for a reference only",
+            )
+            # It commands zeros meanwhile, and a driver wants one before it takes motion.
+            graph.wait_for(
+                lambda: bus.last and bus.last.state == BusState.STATE_MOVING,
+                40.0,
+                "the driver to take commands",
             )
             graph.wait_for(self._cmd_vel.get_subscription_count, 20.0, "the trajectory generator")
             graph.every(0.05, self._publish)
