@@ -40,10 +40,7 @@ from snake_control.nodes.bus_requests import NotLoweredError
 from snake_control.nodes.bus_snapshot import Snapshot, State
 from snake_control.nodes.managed import ManagedNode, logged
 from snake_control.nodes.parameters import NodeParameters
-from snake_control.nodes.process import run
-
-_THREAD_SWITCH_S = 5e-4
-"""A callback may keep the bus thread waiting for the interpreter this long (default 5 ms)."""
+from snake_control.nodes.process import THREAD_SWITCH_S, run
 
 _LOG_PERIOD_S = 1.0
 _CHECK_PERIOD_S = 0.2
@@ -350,7 +347,7 @@ class BusDriver(ManagedNode):
 
 def main() -> int:
     """Run the node; return the exit code."""
-    sys.setswitchinterval(_THREAD_SWITCH_S)
+    sys.setswitchinterval(THREAD_SWITCH_S)
     return run(BusDriver, "bus_driver")
 
 

@@ -35,7 +35,7 @@ from snake_control.model.rotation import quaternion_from_rpy
 from snake_control.nodes import topics
 from snake_control.nodes.conversions import header, point, quaternion
 from snake_control.nodes.parameters import NodeParameters
-from snake_control.nodes.process import run
+from snake_control.nodes.process import THREAD_SWITCH_S, run
 from snake_control.plant.kinematic import KinematicPlant
 from snake_control.plant.plant import PlantState
 
@@ -288,6 +288,7 @@ def _servo_parameters(own: MockBusConfig) -> ServoParameters:
 
 def main() -> int:
     """Run the node."""
+    sys.setswitchinterval(THREAD_SWITCH_S)
     return run(MockBus, "mock_bus")
 
 

@@ -23,6 +23,10 @@ from snake_control.errors import ConfigError, SnakeError
 EXIT_BAD_CONFIG = 2
 EXIT_FAILED = 1
 
+THREAD_SWITCH_S = 5e-4
+"""How long a callback may keep a thread that serves a bus waiting for the interpreter (default
+5 ms); for ``sys.setswitchinterval``."""
+
 _ENDING_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
