@@ -23,6 +23,9 @@ from snake_control.ax12.velocity import SEED_SPEED_RAW
 from snake_control.errors import ServoError
 
 _RAM = ct.TORQUE_ENABLE.address
+_TORQUE_AND_LED = b"\x01\x01"
+"""The LED is lit while a servo is armed. After a power failure it is not, whatever a servo makes of
+the goals that it gets then: all other settings may be those of the factory."""
 _RAM_LENGTH = ct.TABLE_END - _RAM
 _WATCHED = ct.TORQUE_LIMIT.end - _RAM
 
@@ -86,7 +89,7 @@ def _arm(bus: Bus, joints: Sequence[JointSetup], servos: Sequence[ServoInfo]) ->
         for i, (joint, servo) in enumerate(zip(joints, servos, strict=True)):
             try:
                 seeds[i] = _settle(bus, joint, servo, seeds[i])
-                bus.write_verified(joint.servo_id, ct.TORQUE_ENABLE.address, b"\x01")
+                bus.write_verified(joint.servo_id, ct.TORQUE_ENABLE.address, _TORQUE_AND_LED)
             except ServoError as error:
                 findings.extend(f"{joint}: no torque: {text}" for text in error.findings)
     if findings:
@@ -106,7 +109,8 @@ def disarm(bus: Bus, joints: Sequence[JointSetup]) -> None:
     for _ in range(2):
         if wheels:
             bus.sync_write(ct.MOVING_SPEED.address, wheels)
-        bus.sync_write(ct.TORQUE_ENABLE.address, {joint.servo_id: b"\x00" for joint in joints})
+        off = {joint.servo_id: b"\x00\x00" for joint in joints}
+        bus.sync_write(ct.TORQUE_ENABLE.address, off)
 
 
 def disarm_confirmed(bus: Bus, joints: Sequence[JointSetup]) -> tuple[bool | None, ...]:
@@ -147,7 +151,7 @@ class Armed(NamedTuple):
     wrong: str
 
 
-def check_armed(bus: Bus, joint: JointSetup) -> Armed | None:
+def check_armed(bus: Bus, joint: JointSetup, servo: ServoInfo) -> Armed | None:
     """Return what became of an armed servo's RAM, ``None`` if it did not answer.
 
     A servo that lost power for a moment answers as before but has lost torque and settings; after
@@ -163,7 +167,11 @@ def check_armed(bus: Bus, joint: JointSetup) -> Armed | None:
         wrong = "torque limit is 0: it switched itself off after an alarm"
     elif not torque:
         wrong = "torque is off: an alarm, or its power failed for a moment"
-    elif reply.data[2:6] != _compliance(joint):
+    elif (
+        ct.LED.decode(reply.data, _RAM) != 1
+        or reply.data[2:6] != _compliance(joint)
+        or ct.TORQUE_LIMIT.decode(reply.data, _RAM) != _torque_limit(joint, servo)
+    ):
         wrong = "its settings are gone: did its power fail for a moment?"
     return Armed(torque, shut_down, wrong)
 

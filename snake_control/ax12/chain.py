@@ -19,13 +19,14 @@ from snake_control.ax12.arming import (
     require_off,
 )
 from snake_control.ax12.bus import Bus, Counters
-from snake_control.ax12.driven_joint import FEEDBACK_LOST_S, DrivenJoint, JointReading, Motion
+from snake_control.ax12.driven_joint import DrivenJoint, JointReading, Motion
 from snake_control.ax12.eeprom import ServoInfo, effective_range
 from snake_control.ax12.joint import JointSetup
 from snake_control.ax12.telemetry import Request, TelemetrySchedule
 from snake_control.errors import ServoError
 
 _RETRY_SHARE = 0.25
+_AT_REST = ct.MOVING_SPEED.encode(0)
 
 
 class ServoChain:
@@ -51,8 +52,10 @@ class ServoChain:
         self._armed = False
         self._written_at = -math.inf
         self._period = motion.period
+        self._unheard_time = motion.unheard_time
         self._telemetry = TelemetrySchedule(len(self._servos), motion.period, motion.slow_period)
         self._finding = ""
+        self._suspects: set[int] = set()
 
     @property
     def armed(self) -> bool:
@@ -100,6 +103,7 @@ class ServoChain:
             raise
         self._armed = True
         self._finding = ""
+        self._suspects.clear()
         self._written_at = self._clock()
         for servo, seed in zip(self._servos, seeds, strict=True):
             servo.armed(seed, self._written_at)
@@ -137,6 +141,11 @@ class ServoChain:
         wheels: dict[int, bytes] = {}
         for i, servo in enumerate(self._servos):
             sent = servo.step(None if velocities is None else velocities[i], dt, now)
+            if servo.limp:
+                # There are firmwares to which a goal is a reason to switch torque on again.
+                if servo.wheel:
+                    wheels[servo.joint.servo_id] = _AT_REST
+                continue
             speed = ct.MOVING_SPEED.encode(sent.speed_raw)
             if sent.goal_ticks is None:
                 wheels[servo.joint.servo_id] = speed
@@ -146,6 +155,16 @@ class ServoChain:
             self._bus.sync_write(ct.GOAL_POSITION.address, goals)
         if wheels:
             self._bus.sync_write(ct.MOVING_SPEED.address, wheels)
+
+    def stop_wheels(self) -> None:
+        """Tell servos in wheel mode to stop, whoever set them going; joints need no such word.
+
+        A wheel turns by its last Moving Speed until somebody says otherwise: through an unplugged
+        adapter, and after a driver that died.
+        """
+        wheels = [servo.joint.servo_id for servo in self._servos if servo.wheel]
+        if wheels:
+            self._bus.sync_write(ct.MOVING_SPEED.address, dict.fromkeys(wheels, _AT_REST))
 
     def rehearse(self, velocities: Sequence[float] | None) -> None:
         """Work out one cycle's goals and speeds as ``write`` does, and send nothing.
@@ -166,7 +185,8 @@ class ServoChain:
         """
         begin = self._clock()
         lost = frozenset(i for i, servo in enumerate(self._servos) if self._is_lost(servo))
-        asked = self._check(self._telemetry.check(lost, begin, spare=False))
+        asked = self._check_suspects(until)
+        asked = self._check(self._telemetry.check(lost, begin, spare=False)) or asked
         for request in self._telemetry.cycle(lost, begin):
             if asked and self._clock() >= until:
                 return
@@ -177,15 +197,26 @@ class ServoChain:
         if now < until:
             self._check(self._telemetry.check(lost, now, spare=True))
 
+    def _check_suspects(self, until: float) -> bool:
+        """Look at the settings of servos that answer again: their power may have failed."""
+        asked = False
+        for index in sorted(self._suspects):
+            if asked and self._clock() >= until:
+                break
+            self._suspects.discard(index)
+            asked = self._check(index)
+        return asked
+
     def _check(self, index: int | None) -> bool:
         """Look at the settings of a servo; return whether any was asked."""
         if index is None:
             return False
         servo = self._servos[index]
-        found = check_armed(self._bus, servo.joint)
+        found = check_armed(self._bus, servo.joint, servo.info)
         if found is not None:
             servo.torque_on, servo.shut_down = found.torque_on, found.shut_down
             if found.wrong and self._armed:
+                servo.unset = True
                 self._finding = f"{servo.joint}: {found.wrong}"
         return True
 
@@ -210,7 +241,7 @@ class ServoChain:
         now = self._clock()
         unheard = [servo.joint for servo in self._servos if servo.unheard(now)]
         if unheard:
-            return f"no believable reading for {FEEDBACK_LOST_S:g} s from " + ", ".join(
+            return f"no believable reading for {self._unheard_time:g} s from " + ", ".join(
                 map(str, unheard)
             )
         stuck = [f"{s.joint} ({s.not_following})" for s in self._servos if s.not_following]
@@ -231,6 +262,8 @@ class ServoChain:
         servo.asked_in_vain += 1
         if reply is None:
             return False
+        if missed and self._armed:
+            self._suspects.add(request.servo)
         servo.take(reply, 0.5 * (begin + self._clock()))
         return True
 

@@ -23,9 +23,6 @@ from snake_control.ax12.units import (
 )
 from snake_control.ax12.velocity import JointModeVelocity, WheelModeVelocity
 
-FEEDBACK_LOST_S = 0.5
-"""Without a believable reading of a driven joint for so long the robot must stop."""
-
 SLOW_STALE_S = 3.0
 """Voltage and temperature that were not read for so long are not known any more."""
 
@@ -43,6 +40,8 @@ class Motion:
         acceleration: see ``VelocityLimits``.
         lost_after_misses: missed reads in a row after which a servo counts as lost.
         follow_time: how long a joint may not do what it is told [s] (see ``FollowWatch``).
+        unheard_time: without a believable reading of a driven joint for so long the robot must
+            stop [s].
         slow_period: within which voltage and temperature of each servo are read [s]; with
             ``period`` or less all of it is read in each cycle.
     """
@@ -53,6 +52,7 @@ class Motion:
     lost_after_misses: int
     follow_time: float = 1.0
     slow_period: float = 0.5
+    unheard_time: float = 0.5
 
 
 @dataclasses.dataclass(frozen=True)
@@ -101,6 +101,7 @@ class DrivenJoint:
         joint, info: what configuration and servo say.
         wheel: whether it is in wheel mode.
         torque_on, shut_down: as in ``JointReading``.
+        unset: whether its settings are no longer those that it was armed with.
         asked_in_vain: questions since the last reply to go by.
     """
 
@@ -129,9 +130,11 @@ class DrivenJoint:
         self._feedback = Feedback(no_load, self.wheel, motion.period)
         self._following = FollowWatch(motion.follow_time)
         self._look_ahead = motion.look_ahead
+        self._unheard_time = motion.unheard_time
         self._speed_unit = no_load / MAX_RAW if self.wheel else RAD_S_PER_SPEED_UNIT
         self.torque_on = False
         self.shut_down = False
+        self.unset = False
         self.asked_in_vain = 0
         self._heard_at = -math.inf  # last reply to go by
         self._alarms_in_row = 0
@@ -140,7 +143,7 @@ class DrivenJoint:
     def armed(self, seed: Seed, now: float) -> None:
         """Take note that it is held from now on."""
         self._sent = self._control.latch(seed.angle)
-        self.torque_on, self.shut_down = True, False
+        self.torque_on, self.shut_down, self.unset = True, False, False
         self._following.reset()
         self._heard_at = now
         self.asked_in_vain = self._alarms_in_row = 0
@@ -192,12 +195,17 @@ class DrivenJoint:
             return ()
         return error_names(self._feedback.error_bits & self.info.shutdown_bits)
 
+    @property
+    def limp(self) -> bool:
+        """Whether it is known to have no torque, or settings that it was not armed with."""
+        return not self.torque_on or self.shut_down or self.unset or bool(self.alarms)
+
     def unheard(self, now: float) -> bool:
         """Whether there is nothing to go by for too long, though it was asked.
 
         While this process did not run, nobody could answer.
         """
-        return now - self._heard_at > FEEDBACK_LOST_S and self.asked_in_vain >= _ASKED_IN_VAIN
+        return now - self._heard_at > self._unheard_time and self.asked_in_vain >= _ASKED_IN_VAIN
 
     @property
     def not_following(self) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import enum
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from snake_control.ax12.driven_joint import JointReading
 from snake_control.ax12.units import error_names
@@ -43,10 +43,15 @@ class Thresholds:
 
 @dataclasses.dataclass(frozen=True)
 class Verdict:
-    """Severity and its reasons in words."""
+    """Severity and its reasons in words.
+
+    Attributes:
+        kinds: the reasons without their numbers.
+    """
 
     level: Level
     text: str
+    kinds: frozenset[str] = frozenset()
 
 
 def judge(
@@ -60,39 +65,49 @@ def judge(
         expected_torque: what gravity asks of the joint by the model [N m]; NaN if unknown.
     """
     if not reading.online:
-        return Verdict(Level.ERROR, "lost: it does not answer any more")
+        return Verdict(Level.ERROR, "lost: it does not answer any more", frozenset({"lost"}))
     if math.isinf(reading.age):
-        return Verdict(Level.STALE, "no reading yet")
-    reasons = []
-    level = Level.OK
+        return Verdict(Level.STALE, "no reading yet", frozenset({"no reading"}))
+    errors = dict(_errors(reading))
+    warnings = dict(_warnings(reading, thresholds, expected_torque))
+    level = Level.ERROR if errors else Level.WARN if warnings else Level.OK
+    text = "; ".join([*errors.values(), *warnings.values()]) or "OK"
+    return Verdict(level, text, frozenset({*errors, *warnings}))
+
+
+def _errors(reading: JointReading) -> Iterator[tuple[str, str]]:
+    """Yield kind and text of each."""
     if reading.error_bits:
-        level = Level.ERROR
-        reasons.append("reports " + ", ".join(error_names(reading.error_bits)))
+        text = "reports " + ", ".join(error_names(reading.error_bits))
+        yield text, text
     if reading.shut_down:
-        level = Level.ERROR
-        reasons.append("shut down: its torque limit is 0 after an alarm")
-    warnings = []
+        yield "shut down", "shut down: its torque limit is 0 after an alarm"
+
+
+def _warnings(
+    reading: JointReading, thresholds: Thresholds, expected_torque: float
+) -> Iterator[tuple[str, str]]:
+    """Yield kind and text of each."""
     if reading.age > thresholds.age_s:
-        warnings.append("its reading is old")
+        yield "old", "its reading is old"
     if reading.temperature >= thresholds.temperature_c:
-        warnings.append(f"{reading.temperature:.0f} degC")
+        yield "hot", f"{reading.temperature:.0f} degC"
     # NaN is no voltage to warn of.
     if reading.voltage < thresholds.voltage_low_v or reading.voltage > thresholds.voltage_high_v:
-        warnings.append(f"{reading.voltage:.1f} V")
+        yield "voltage", f"{reading.voltage:.1f} V"
     if abs(reading.load) >= thresholds.load:
-        warnings.append(f"load {100 * abs(reading.load):.0f} %")
+        yield "load", f"load {100 * abs(reading.load):.0f} %"
     if reading.doubt:
-        warnings.append(f"does not follow: {reading.doubt}")
+        yield "does not follow", f"does not follow: {reading.doubt}"
     if reading.error_rate >= thresholds.communication_error_rate:
-        warnings.append(f"{100 * reading.error_rate:.0f} % of its replies fail at the first try")
+        share = 100 * reading.error_rate
+        yield "replies", f"{share:.0f} % of its replies fail at the first try"
     if abs(expected_torque) > thresholds.torque_n_m:
-        warnings.append(
+        yield (
+            "torque",
             f"carries {abs(expected_torque):.2f} N m, should carry {thresholds.torque_n_m:g} N m "
-            "for long"
+            "for long",
         )
-    if warnings:
-        level = max(level, Level.WARN)
-    return Verdict(level, "; ".join(reasons + warnings) or "OK")
 
 
 class HealthLog:
@@ -102,7 +117,7 @@ class HealthLog:
     """
 
     def __init__(self) -> None:
-        self._levels: dict[str, tuple[Level, int]] = {}
+        self._known: dict[str, tuple[Level, frozenset[str]]] = {}
 
     def changes(
         self, readings: Sequence[JointReading], verdicts: Sequence[Verdict]
@@ -110,9 +125,9 @@ class HealthLog:
         """Return level and text of everything new since the last call."""
         lines = []
         for reading, verdict in zip(readings, verdicts, strict=True):
-            state = (verdict.level, reading.error_bits)
-            before = self._levels.get(reading.joint.name, (Level.OK, 0))
-            self._levels[reading.joint.name] = state
+            state = (verdict.level, verdict.kinds)
+            before = self._known.get(reading.joint.name, (Level.OK, frozenset()))
+            self._known[reading.joint.name] = state
             if state != before:
                 lines.append((verdict.level, f"{reading.joint}: {verdict.text}"))
         return lines

@@ -21,6 +21,7 @@ import time
 from pathlib import Path
 from typing import Protocol
 
+import serial
 from dynamixel_sdk import PortHandler
 
 from snake_control.errors import BusError
@@ -81,7 +82,6 @@ class SerialPort(PortHandler):  # type: ignore[misc]
         try:
             if not self.setBaudRate(baud_rate):
                 raise BusError(f"{path}: dynamixel_sdk does not open ports at {baud_rate} baud")
-            self.ser.exclusive = True
         except BusError:
             raise
         except (*PORT_FAILURES, ValueError) as error:
@@ -98,6 +98,20 @@ class SerialPort(PortHandler):  # type: ignore[misc]
                 self.ser.close()
 
     # What the SDK calls. Its names.
+
+    def setupPort(self, cflag_baud: int) -> bool:
+        """Open the port, locked before its rate is set.
+
+        The rate belongs to the device and not to whoever opened it: setting it first, as the SDK
+        does, would take the line from a driver that holds the lock.
+        """
+        self.closePort()
+        self.ser = serial.Serial(
+            port=self.port_name, baudrate=self.baudrate, timeout=0, exclusive=True
+        )
+        self.is_open = True
+        self.ser.reset_input_buffer()
+        return True
 
     def closePort(self) -> None:
         """Close the port."""

@@ -49,6 +49,7 @@ def scan(
     rates: Sequence[int],
     ids: Sequence[int],
     progress: Callable[[int, int], None] = lambda *_: None,
+    retries: int = 0,
 ) -> list[Found]:
     """Ask every id at every rate.
 
@@ -57,6 +58,7 @@ def scan(
         rates: [bit/s], of those that the SDK opens.
         ids: 0 to 253.
         progress: called with the rate and how many ids were asked at it.
+        retries: how often an id that is silent is asked again.
 
     Returns:
         What answered, by rate in the order given, then by id.
@@ -67,7 +69,7 @@ def scan(
     found = []
     for rate in rates:
         # A byte at 9600 takes 1 ms; the wait for the reply's own bytes is added by the port.
-        bus = Bus(SerialPort(path, rate, _REPLY_TIMEOUT_S), retries=0)
+        bus = Bus(SerialPort(path, rate, _REPLY_TIMEOUT_S), retries=retries)
         try:
             for number, servo_id in enumerate(ids, 1):
                 one = look_at(bus, servo_id, rate)
@@ -81,7 +83,7 @@ def scan(
 
 def look_at(bus: Bus, servo_id: int, rate: int) -> Found | None:
     """Return what one id says, ``None`` if nothing answers to it."""
-    answered = bus.ping(servo_id, retries=0) is not None
+    answered = bus.ping(servo_id) is not None
     if not answered and not bus.counters[servo_id].corrupt_replies:
         return None
     with bus.patient():

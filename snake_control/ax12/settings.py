@@ -78,6 +78,24 @@ def _limits(joint: JointSetup, block: bytes, range_too: bool) -> tuple[int, int]
     return min(cw, lower), max(ccw, upper)
 
 
+def rate_change(block: bytes, rate: int) -> list[Change]:
+    """Return what has to be written for a servo to listen at a rate [bit/s], last of all."""
+    now, wanted = ct.BAUD_RATE.decode(block, 0), round(2_000_000 / rate) - 1
+    return [Change(ct.BAUD_RATE, now, wanted, f"{rate} bit/s")] if now != wanted else []
+
+
+def write_rate(bus: Bus, servo_id: int, change: Change) -> None:
+    """Have a servo listen at another rate, from now on; whether it does, only that rate tells.
+
+    Raises:
+        ServoError: it has torque, is locked, or does not answer.
+        BusError: the port failed.
+    """
+    write(bus, servo_id, [])
+    # The acknowledgement comes at the old rate or at the new one.
+    bus.write(servo_id, change.register.address, change.register.encode(change.wanted))
+
+
 def write(bus: Bus, servo_id: int, wanted: list[Change]) -> None:
     """Write and read back; registers that hold the value already are left alone.
 

@@ -30,6 +30,13 @@ class BusDriverConfig:
     lost_after_misses: int = parameter(
         25, "missed reads in a row after which a servo counts as lost", low=1, high=1000
     )
+    unheard_timeout_s: float = parameter(
+        0.5,
+        "stop when a driven joint has given no believable reading for so long; at usual rates that "
+        "is before lost_after_misses [s]",
+        low=0.1,
+        high=60.0,
+    )
     follow_timeout_s: float = parameter(
         1.0,
         "stop when a joint was told to move for so long and is not seen moving: blocked, or its "

@@ -100,6 +100,7 @@ class Line(Protocol):
 @dataclasses.dataclass(eq=False)
 class _Active:
     fault: Fault
+    servos: tuple[Servo, ...]
     until: float
     undo: Callable[[], None]
 
@@ -163,7 +164,7 @@ class Injector:
         self._refuse_twice(fault, servos)
         until = now + fault.duration_s if fault.duration_s else math.inf
         undo = self._begin(fault, servos)
-        self._active.append(_Active(fault, until, undo))
+        self._active.append(_Active(fault, tuple(servos), until, undo))
         self._took_effect()
         self._log(f"fault: {fault}")
 
@@ -182,8 +183,15 @@ class Injector:
         for entry in [entry for entry in self._active if entry.until <= now]:
             self._end(entry)
         while self._coming and self._coming[0][0] <= now:
-            _, fault = self._coming.pop(0)
-            self.inject(fault, now)
+            at, fault = self._coming.pop(0)
+            try:
+                # Its time counts from when it should have begun: the next may begin at its end.
+                self.inject(fault, at)
+            except FaultError as error:
+                # Somebody has brought it about already, or given a servo another id.
+                self._log(f"no fault: {error}")
+        if self._active and self.next_change_at <= now:
+            self.advance(now)
 
     # What the bus asks.
 
@@ -259,10 +267,10 @@ class Injector:
         kinds = {entry.fault.kind for entry in self._active}
         self._echoes, self._is_frozen = "echo" in kinds, "frozen_bus" in kinds
         self._by_servo = {}
-        for fault in self.active:
-            if fault.about.concerns is Concerns.REPLIES:
-                for servo in self._servos(fault):
-                    self._by_servo.setdefault(id(servo), []).append(fault)
+        for entry in self._active:
+            if entry.fault.about.concerns is Concerns.REPLIES:
+                for servo in entry.servos:
+                    self._by_servo.setdefault(id(servo), []).append(entry.fault)
         # A bus without faults is not to be slowed down by looking for them.
         self._bus.filter = self if self._active else None
 
@@ -270,12 +278,13 @@ class Injector:
         # What a fault of a servo or of the line changes is put back at its end; once.
         if fault.about.concerns is Concerns.REPLIES:
             return
-        for other in self.active:
-            if other.kind != fault.kind:
+        for other in self._active:
+            if other.fault.kind != fault.kind:
                 continue
-            both = {s.id for s in self._servos(other)} & {s.id for s in servos}
-            if both or not servos:
-                raise FaultError("fault", fault.kind, f"in force already ({other}): clear it first")
+            if not servos or {id(s) for s in other.servos} & {id(s) for s in servos}:
+                raise FaultError(
+                    "fault", fault.kind, f"in force already ({other.fault}): clear it first"
+                )
 
     def _servos(self, fault: Fault) -> list[Servo]:
         present = {servo.id for servo in self._bus.servos}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import threading
 from collections.abc import Sequence
 
 _ZERO_RAD_S = 1e-6
@@ -17,6 +18,9 @@ a controller without joint states commands zero.
 
 _REFUSAL_SHOWN_S = 1.0
 
+_SIGN_OF_LIFE_S = 0.5
+"""Without one for so long whoever takes commands did not run, and silence means nothing."""
+
 
 @dataclasses.dataclass(frozen=True)
 class _Command:
@@ -25,7 +29,7 @@ class _Command:
 
 
 class CommandBuffer:
-    """Buffer of one command; one thread writes, another reads. Times are monotonic [s]."""
+    """Buffer of one command; any thread may write or read. Times are monotonic [s]."""
 
     def __init__(self, timeout: float) -> None:
         """Start empty; a command is executed until ``timeout`` seconds after it was computed."""
@@ -34,18 +38,35 @@ class CommandBuffer:
         self._waiting_since: float | None = None
         self._heard_at = -math.inf
         self._refused: tuple[float, str] = (-math.inf, "")
+        self._alive_at = -math.inf
+        self._lock = threading.Lock()
+
+    def alive(self, now: float) -> None:
+        """Note that commands are being taken; to be called several times a second.
+
+        Silence while nobody listened is no pause of the one who commands.
+        """
+        with self._lock:
+            if not self._listening(now):
+                self._heard_at = now
+            self._alive_at = now
+
+    def _listening(self, now: float) -> bool:
+        return self._alive_at == -math.inf or now - self._alive_at <= _SIGN_OF_LIFE_S
 
     def take(self, velocities: Sequence[float], age: float, now: float) -> None:
         """Take joint velocities [rad/s] that were computed ``age`` seconds ago."""
-        paused = now - self._heard_at > max(_PAUSE_S, self._timeout)
-        self._heard_at = now
-        since = self._waiting_since
-        if since is not None and not paused:
-            zero = all(abs(v) <= _ZERO_RAD_S for v in velocities)
-            if not zero or now - since <= _PAUSE_S:
-                return
-        self._waiting_since = None
-        self._command = _Command(tuple(velocities), now - age)
+        with self._lock:
+            silent = now - self._heard_at > max(_PAUSE_S, self._timeout)
+            paused = silent and self._listening(now)
+            self._heard_at = now
+            since = self._waiting_since
+            if since is not None and not paused:
+                zero = all(abs(v) <= _ZERO_RAD_S for v in velocities)
+                if not zero or now - since <= _PAUSE_S:
+                    return
+            self._waiting_since = None
+            self._command = _Command(tuple(velocities), now - age)
 
     def refuse(self, why: str, now: float) -> None:
         """Say in the coming texts that a command was not taken."""
@@ -53,7 +74,8 @@ class CommandBuffer:
 
     def clear(self) -> None:
         """Forget the command."""
-        self._command = None
+        with self._lock:
+            self._command = None
 
     def wait_for_zero(self, asked_at: float, now: float) -> None:
         """Take no command before one that is zero, or before a pause from now on.
@@ -65,9 +87,10 @@ class CommandBuffer:
             asked_at: when the end of the stop was asked for; commands may not be read since.
             now: when it was carried out.
         """
-        self._command = None
-        if asked_at - self._heard_at <= _PAUSE_S:
-            self._waiting_since = self._heard_at = now
+        with self._lock:
+            self._command = None
+            if asked_at - self._heard_at <= _PAUSE_S:
+                self._waiting_since = self._heard_at = now
 
     def wait_for_start(self, now: float) -> None:
         """Take no command that somebody was sending already when the driver started.
@@ -75,13 +98,16 @@ class CommandBuffer:
         He may have asked for it all the time, of a driver that ran before; a pause or a zero shows
         that he means it.
         """
-        self._command = None
-        self._waiting_since = self._heard_at = now
+        with self._lock:
+            self._command = None
+            self._waiting_since = self._heard_at = now
 
     def newest(self, now: float) -> tuple[tuple[float, ...] | None, str]:
         """Return the velocities to execute, ``None`` to hold, and why."""
-        command = self._command
-        if self._waiting_since is not None and now - self._heard_at <= self._timeout:
+        with self._lock:
+            command, waiting = self._command, self._waiting_since is not None
+            heard_at = self._heard_at
+        if waiting and now - heard_at <= self._timeout:
             return None, "holding: waiting for a zero command"
         if command is None:
             return None, "holding: no command yet"

@@ -75,6 +75,7 @@ def check_servos(
         driver.acceleration_limit_rad_s2,
         driver.lost_after_misses,
         driver.follow_timeout_s,
+        unheard_time=driver.unheard_timeout_s,
     )
     bus.reset_counters()
     found = handshake(bus, joints, models)

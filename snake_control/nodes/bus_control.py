@@ -113,6 +113,16 @@ class BusControl:
         chain.read(begin + READ_SHARE * self._period)
         return True
 
+    def stop_wheels(self) -> None:
+        """Tell servos in wheel mode to stop, and nothing to the others; a lost port is no error."""
+        chain = self.session.chain
+        if chain is None or self._driver.dry_run or not self._active:
+            return
+        try:
+            chain.stop_wheels()
+        except BusError as error:
+            self.lose_port(error)
+
     def end(self, torque_off: bool, turn: Callable[[], None]) -> None:
         """Let go of the servos; they hold by themselves unless torque is to go off.
 
@@ -377,6 +387,8 @@ class BusControl:
             chain.rehearse(velocities)
         elif chain.armed:
             chain.write(velocities)
+        else:
+            chain.stop_wheels()
 
     def _look_for_faults(self) -> None:
         chain = self.session.chain

@@ -22,6 +22,7 @@ from snake_interfaces.msg import JointVelocityCommand
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool, Trigger
 
+from snake_control.ax12.driven_joint import JointReading
 from snake_control.ax12.health import HealthLog, Level, Thresholds, judge
 from snake_control.errors import SnakeError
 from snake_control.nodes import topics
@@ -286,11 +287,10 @@ class BusDriver(ManagedNode):
         """Say in a dry run what would be sent, when it is another motion than before."""
         motion: dict[str, float] = {}
         if snapshot.state is State.DRY_RUN:
-            motion = {
-                reading.joint.name: math.copysign(reading.goal_speed, reading.goal - reading.angle)
-                for reading in snapshot.readings
-                if abs(reading.goal - reading.angle) > _MOVING_RAD
+            speeds = {
+                reading.joint.name: _rehearsed_speed(reading) for reading in snapshot.readings
             }
+            motion = {name: speed for name, speed in speeds.items() if speed}
         rounded = {name: round(speed, 1) for name, speed in motion.items()}
         if rounded == self._rehearsed:
             return
@@ -343,6 +343,15 @@ class BusDriver(ManagedNode):
 
     def _serve(self, service: topics.Service, callback) -> None:  # type: ignore[no-untyped-def]
         self.create_service(service.type, service.name, callback)
+
+
+def _rehearsed_speed(reading: JointReading) -> float:
+    """Return the speed that was not sent [rad/s], 0 for a joint that would rest."""
+    if math.isnan(reading.goal):
+        # Wheel mode: its speed has a sign of its own. NaN before the first.
+        return reading.goal_speed if abs(reading.goal_speed) > 0.0 else 0.0
+    ahead = reading.goal - reading.angle
+    return math.copysign(reading.goal_speed, ahead) if abs(ahead) > _MOVING_RAD else 0.0
 
 
 def main() -> int:

@@ -99,7 +99,11 @@ class BusLoop:
         self._control.session.close()
 
     def check(self) -> None:
-        """Raise ``RefusedError`` if the thread ended by itself, which it must not."""
+        """Raise ``RefusedError`` if the thread ended by itself, which it must not.
+
+        To be called several times a second by whoever takes commands: it shows that they are taken.
+        """
+        self._control.commands.alive(time.monotonic())
         thread = self._thread
         if thread is not None and not thread.is_alive() and not self._stopping:
             raise RefusedError(
@@ -150,7 +154,7 @@ class BusLoop:
             ServoError: a servo refused torque, and none was switched on; or torque off was sent to
                 all, but the servos named did not confirm it.
         """
-        return self._request(self._control.torque_on if on else self._control.torque_off)
+        return self._request(self._torque_on if on else self._control.torque_off)
 
     def release(self) -> str:
         """Free the joints as ``set_torque(False)`` does; return when a lowering has ended, too.
@@ -177,7 +181,7 @@ class BusLoop:
             RefusedError: not in this state.
             BusError, ServoError: the fault stays; no torque was switched on, and none off.
         """
-        return self._request(self._control.recover)
+        return self._request(self._recover)
 
     # In the thread of the loop.
 
@@ -190,6 +194,15 @@ class BusLoop:
         done = self._control.activate()
         self._schedule.reset_counts()
         return done
+
+    def _torque_on(self) -> str:
+        # No cycle runs while servos are asked and armed: what moves must come to rest before.
+        self._burst_of_hold()
+        return self._control.torque_on()
+
+    def _recover(self) -> str:
+        self._burst_of_hold()
+        return self._control.recover()
 
     def _deactivate(self) -> str:
         self._burst_of_hold()
@@ -208,8 +221,7 @@ class BusLoop:
             raise
         finally:
             try:
-                self._burst_of_hold()
-                self._control.end(self._torque_off_at_end, self._turn)
+                self._come_to_an_end()
             finally:
                 self._control.forsake()
                 self._requests.end()
@@ -258,6 +270,14 @@ class BusLoop:
             if now - self._publish_logged_at >= _LOG_PERIOD_S:
                 self._publish_logged_at = now
                 self._error(f"the state cannot be published: {error!r}")
+
+    def _come_to_an_end(self) -> None:
+        try:
+            self._burst_of_hold()
+        finally:
+            # A mistake that ended the thread may end the burst, too.
+            self._control.stop_wheels()
+            self._control.end(self._torque_off_at_end, self._turn)
 
     def _burst_of_hold(self) -> None:
         try:

@@ -12,7 +12,7 @@ import pytest
 from snake_control.ax12.bus import Bus
 from snake_control.ax12.chain import ServoChain
 from snake_control.ax12.driven_joint import Motion
-from snake_control.ax12.health import HealthLog, Level, Thresholds, Verdict, judge
+from snake_control.ax12.health import HealthLog, Level, Thresholds, judge
 from snake_control.ax12.joint import JointSetup
 from snake_control.ax12.port import SerialPort
 from snake_control.ax12.startup import handshake
@@ -283,8 +283,54 @@ def test_judgement_and_its_log(chain: ServoChain, servos: ScriptedServos) -> Non
         (Level.ERROR, "joint_3 (servo id 3): reports overheating, overload"),
     ]
     assert look()[1] == []
-    servos.memory[1][43] = 40
+    # Numbers are no change, another reason is one though the level stays.
+    servos.memory[1][43] = 66
+    assert look()[1] == []
+    servos.memory[1][42] = 80
+    assert look()[1] == [(Level.WARN, "joint_1 (servo id 1): 66 degC; 8.0 V")]
+    servos.memory[1][42:44] = bytes((111, 40))
     assert look()[1] == [(Level.OK, "joint_1 (servo id 1): OK")]
+
+
+def test_a_servo_that_answers_again_is_looked_at_before_the_next_goals(
+    chain: ServoChain, servos: ScriptedServos
+) -> None:
+    chain.arm()
+    read(chain)
+    servos.answer = lambda i, answer: b"" if i[2] == 2 and i[4] == READ else answer
+    read(chain)
+    servos.answer = None
+    # A firmware that takes a goal for a reason to give torque; all but the LED is as before.
+    servos.memory[2][24:26] = bytes((1, 0))
+    read(chain)
+    read(chain)
+    assert chain.fault().startswith("joint_2 (servo id 2): its settings are gone")
+    before = len(servos.packets)
+    chain.write([0.3, 0.3, 0.3])
+    read(chain)
+    goals, _ = [p for p in servos.packets[before:] if p[4] == SYNC_WRITE]
+    assert list(goals[7:-1:5]) == [1], "joint 2 is left alone until it is armed again"
+    servos.memory[2][25] = 1
+    chain.arm()
+    chain.write([0.3, 0.3, 0.3])
+    read(chain)
+    assert chain.fault() == ""
+    assert list(servos.instructions(SYNC_WRITE)[-2][7:-1:5]) == [1, 2]
+
+
+def test_a_wheel_that_shut_itself_down_is_told_to_stop(
+    chain: ServoChain, servos: ScriptedServos
+) -> None:
+    chain.arm()
+    chain.write([0.0, 0.0, 2.0])
+    read(chain)
+    assert int.from_bytes(servos.memory[3][32:34], "little") & 0x3FF > 0
+    servos.error_bits[3] = 32
+    read(chain)
+    read(chain)
+    chain.write([0.0, 0.0, 2.0])
+    read(chain)
+    assert int.from_bytes(servos.memory[3][32:34], "little") == 0
 
 
 def test_goals_and_speeds_are_shown_in_the_joints_frame(
@@ -438,4 +484,5 @@ def test_every_threshold_warns(
     read(chain)
     reading = dataclasses.replace(chain.readings()[0], **{"load": 0.0} | changes)  # type: ignore[arg-type]
     verdict = judge(reading, THRESHOLDS, torque)
-    assert verdict == Verdict(Level.OK if text == "OK" else Level.WARN, text)
+    level = Level.OK if text == "OK" else Level.WARN
+    assert (verdict.level, verdict.text) == (level, text)

@@ -20,6 +20,7 @@ from snake_control.ax12.joint import JointSetup
 from snake_control.ax12.startup import handshake
 from snake_control.errors import ServoError
 from snake_control.mock.disturbance import NONE, Disturbance
+from snake_control.mock.parameters import ServoParameters
 from snake_control.mock.servo import Servo
 from support.simulated_bus import MemoryPort, World
 
@@ -231,6 +232,39 @@ def test_a_joint_that_sags_out_of_its_sensors_sight_is_refused_and_held_as_it_wa
         world.pass_until(world.now + 0.013)
     assert servo.driven
     assert servo.registers["goal_position"] == 1009
+
+
+def test_a_firmware_that_takes_goals_for_torque_is_not_driven_after_a_power_failure() -> None:
+    servo = Servo(1, ServoParameters(goal_enables_torque=True))
+    world, chain = single(servo)
+    chain.arm()
+
+    def cycles(seconds: float, velocity: float | None) -> None:
+        end = world.now + seconds
+        while world.now < end:
+            cycle = world.now
+            chain.write(None if velocity is None else [velocity])
+            chain.read(cycle + 0.017)
+            world.pass_until(cycle + 0.02)
+
+    cycles(0.5, 0.3)
+    assert not chain.fault()
+    servo.power_off()
+    cycles(0.1, 0.3)
+    servo.power_on()
+    cycles(0.1, 0.3)
+    assert "settings are gone" in chain.fault() or "torque is off" in chain.fault()
+    before = servo.motion.angle_rad
+    cycles(1.0, 0.3)
+    # What it was sent last lies no further than the look-ahead.
+    assert abs(servo.motion.angle_rad - before) < 0.3 * 0.15 + 36 * TICK
+    rest = servo.motion.angle_rad
+    cycles(1.0, 0.3)
+    assert servo.motion.angle_rad == pytest.approx(rest, abs=TICK)
+    chain.arm()
+    cycles(0.5, 0.3)
+    assert not chain.fault()
+    assert servo.motion.angle_rad > rest + 0.1
 
 
 def test_a_joint_that_a_load_pushes_away_keeps_its_goal() -> None:

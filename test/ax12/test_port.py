@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import pty
+import termios
 import threading
 import time
 import tty
@@ -46,6 +47,16 @@ def test_a_second_driver_is_told_that_the_port_is_in_use() -> None:
             SerialPort(servos.path, 1000000, 0.01)
         first.close()
         SerialPort(servos.path, 1000000, 0.01).close()
+
+
+def test_a_second_program_does_not_change_the_rate_of_the_first() -> None:
+    with ScriptedServos([1]) as servos:
+        first = SerialPort(servos.path, 57600, 0.01)
+        with pytest.raises(BusError, match="in use"):
+            SerialPort(servos.path, 1000000, 0.01)
+        _, _, _, _, at, _, _ = termios.tcgetattr(first.ser.fd)
+        assert at == termios.B57600
+        first.close()
 
 
 def test_a_rate_the_sdk_does_not_know_is_refused() -> None:

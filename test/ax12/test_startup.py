@@ -236,7 +236,7 @@ def test_when_one_refuses_torque_those_that_held_go_on_holding(
     bus: Bus, servos: ScriptedServos
 ) -> None:
     servos.memory[1][24] = 1
-    servos.answer = lambda i, answer: packet(3, 2, 64) if tuple(i[2:6]) == (3, 4, 3, 24) else answer
+    servos.answer = lambda i, answer: packet(3, 2, 64) if tuple(i[2:6]) == (3, 5, 3, 24) else answer
     with pytest.raises(ServoError, match=r"joint_3 .*no torque"):
         armed(bus)
     assert bus.ping(1) is not None
@@ -265,17 +265,24 @@ def test_disarm_needs_no_replies(bus: Bus, servos: ScriptedServos) -> None:
 
 @pytest.mark.parametrize(
     ("address", "value", "words"),
-    [(34, 0, "torque limit is 0"), (24, 0, "torque is off"), (28, 32, "settings are gone")],
+    [
+        (34, 0, "torque limit is 0"),
+        (24, 0, "torque is off"),
+        (28, 32, "settings are gone"),
+        (25, 0, "settings are gone"),
+        (35, 1, "settings are gone"),
+    ],
 )
 def test_a_servo_that_lost_its_settings_is_found(
     address: int, value: int, words: str, bus: Bus, servos: ScriptedServos
 ) -> None:
-    arm(bus, JOINTS, handshake(bus, JOINTS, MODELS).servos)
-    assert check_armed(bus, JOINTS[0]) == (True, False, "")
+    infos = handshake(bus, JOINTS, MODELS).servos
+    arm(bus, JOINTS, infos)
+    assert check_armed(bus, JOINTS[0], infos[0]) == (True, False, "")
     servos.memory[1][address] = value
     if address == 34:
         servos.memory[1][35] = 0
-    found = check_armed(bus, JOINTS[0])
+    found = check_armed(bus, JOINTS[0], infos[0])
     assert found is not None
     assert found.torque_on is (address != 24)
     assert found.shut_down is (address == 34)

@@ -13,6 +13,8 @@ from pathlib import Path
 
 import pytest
 
+from snake_control.ax12.scan import Found
+from snake_control.cli.ax12 import set_id
 from snake_control.cli.ax12.__main__ import main
 from snake_control.mock.bus import Bus as MockBus
 from snake_control.mock.port import PtyPort
@@ -172,6 +174,18 @@ class Terminal(io.StringIO):
         return True
 
 
+def test_configure_brings_servos_to_the_rate_of_the_parameters(mock, ax12):
+    link = mock("--ids", "4", "--baud", "57600").link
+    common = ("configure", "--params-file", PAPER, "--port", link, "--ids", "4")
+    assert ax12(*common, "--yes")[0] == 1, "nothing answers at the rate of the parameters"
+    code, out, err = ax12(*common, "--from-baud", "57600", "--yes")
+    assert code == 0, err
+    assert "Baud Rate (4)" in out
+    assert "joint_4 (servo id 4): answers at 1000000 bit/s" in out
+    code, out, _ = ax12(*common, "--yes")
+    assert (code, out.strip()) == (0, "All servos are set up as the parameters need them.")
+
+
 def test_configure_takes_no_for_an_answer(mock, ax12, tmp_path, monkeypatch):
     link = fresh(mock, tmp_path)
     common = ("configure", "--params-file", PAPER, "--port", link, "--ids", "4")
@@ -181,6 +195,30 @@ def test_configure_takes_no_for_an_answer(mock, ax12, tmp_path, monkeypatch):
     assert "nothing was changed" in err
     monkeypatch.setattr(sys, "stdin", Terminal("y\n"))
     assert ax12(*common)[0] == 0
+
+
+def test_configure_lets_nothing_go_before_all_is_agreed(servo, ax12, monkeypatch):
+    one, link = servo
+    one.store("ccw_angle_limit", 600)
+    one.store("torque_enable", 1)
+    common = ("configure", "--params-file", PAPER, "--port", link, "--ids", "4")
+    for answers in ("n\n", "y\nn\n"):
+        monkeypatch.setattr(sys, "stdin", Terminal(answers))
+        code, _, err = ax12(*common)
+        assert (code, err.rstrip().endswith("nothing was changed")) == (3, True)
+        assert one.registers["torque_enable"] == 1
+    monkeypatch.setattr(sys, "stdin", Terminal("y\ny\n"))
+    assert ax12(*common)[0] == 0
+    assert one.registers["torque_enable"] == 0
+
+
+def test_set_id_refuses_an_id_that_the_scan_missed(servo, ax12, monkeypatch):
+    one, link = servo
+    monkeypatch.setattr(set_id, "scan", lambda *_, **__: [Found(9, 1000000, model=12)])
+    code, _, err = ax12("set-id", "--port", link, "4", "--yes")
+    assert code == 1
+    assert "something answers as 4 already" in err or "servo id 9 does not answer" in err
+    assert one.registers["id"] == 4
 
 
 def test_set_id_wants_one_servo_alone(mock, ax12):
@@ -215,6 +253,10 @@ def test_jog_moves_one_joint_and_lets_go(mock, ax12):
     assert state["servos"][0]["angle_rad"] == pytest.approx(moved["to_rad"], abs=0.01)
     assert ax12(*common, "4", "90", "--yes")[0] == 2, "no long ways"
     assert ax12(*common, "9", "5", "--yes")[0] == 1, "it is not there"
+    for wrong in (("300", "5"), ("x", "5"), ("4", "5", "--speed", "3")):
+        with pytest.raises(SystemExit) as ended:
+            main(["jog", "--port", str(link), *wrong])
+        assert ended.value.code == 2
 
 
 class Hand(io.StringIO):

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from faults.scenario import Expect, Scenario
-from snake_control.ax12.driven_joint import FEEDBACK_LOST_S
 from snake_control.config import Config
 
 Array = NDArray[np.float64]
@@ -24,6 +23,8 @@ OVERLOAD_S = 2.0
 MEASURED_WITHIN_S = 0.06
 """Ground truth comes every 20 ms, from a body that moves in steps of 10 ms; the fault begins
 between two of them, and the clocks of three processes meet here."""
+
+_LATE_S = 0.4
 
 _MOVING, _STOPPED, _EMERGENCY = 2, 4, 5
 
@@ -98,7 +99,7 @@ def timeouts(config: Config) -> dict[str, float]:
         "none": 0.0,
         "command": driver.command_timeout_s,
         # Believed last just before the fault, in the cycle after the time-out found missing.
-        "feedback": FEEDBACK_LOST_S + 2 * period,
+        "feedback": driver.unheard_timeout_s + 2 * period,
         # Two replies in a row with the alarm.
         "alarm": 2 * period,
         "overload": OVERLOAD_S + 2 * period,
@@ -143,6 +144,8 @@ def judge(scenario: Scenario, record: Record, config: Config) -> Outcome:
         wrong.append("did not stop")
     if scenario.expect in (Expect.GOES_ON, Expect.RESTS) and stops:
         wrong.append(f"stopped: {stops[0][1]}")
+    if scenario.expect is Expect.GOES_ON and scenario.situation == "motion":
+        _check_motion(record, wrong)
     _check_rest(scenario, record, config, outcome, bool(stops))
     _check_travel(scenario, record, config, outcome, stops[0][0] if stops else None)
     return outcome
@@ -180,6 +183,17 @@ def _did(
                 return text
     states = [text.split(" | ")[0] for _, _, text in after]
     return states[-1] if states else ""
+
+
+def _check_motion(record: Record, wrong: list[str]) -> None:
+    """Whether the driver still executes commands at the end, and the joints they are for move."""
+    states = [(state, text) for t, state, text in record.states if state >= 0 and t <= record.until]
+    if not states or states[-1][0] != _MOVING:
+        wrong.append(f"does not go on: {states[-1][1] if states else 'nothing heard'}")
+    late = record.time > record.until - _LATE_S
+    moved = np.abs(record.phi_dot[late]).max(axis=0, initial=0.0)
+    still = (record.speed > AT_REST_RAD_S) & (moved < AT_REST_RAD_S)
+    wrong += [f"joint_{i + 1} does not go on" for i in np.flatnonzero(still)]
 
 
 def _check_ranges(scenario: Scenario, record: Record, config: Config, wrong: list[str]) -> None:

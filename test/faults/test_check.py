@@ -16,7 +16,7 @@ from support.graph import CONFIG
 
 ROBOT = load_config(CONFIG / "paper_robot.yaml")
 SPEED = np.array([0.0] * 7 + [0.4, 0.0, 0.0, 0.0])
-MOVING, STOPPED = 2, 4
+HOLDING, MOVING, STOPPED = 1, 2, 4
 STOPS = Scenario("x", "motion", Expect.STOPS, timeout="feedback", reported="servo id 8")
 
 
@@ -59,7 +59,21 @@ def test_a_fault_that_nobody_reports_is_found() -> None:
 
 def test_a_stop_without_need_is_found() -> None:
     goes_on = dataclasses.replace(STOPS, expect=Expect.GOES_ON)
-    assert judge(goes_on, record(), ROBOT).violations == ["stopped: servo id 8"]
+    found = judge(goes_on, record(), ROBOT).violations
+    assert found[0] == "stopped: servo id 8"
+
+
+def test_a_robot_that_should_go_on_and_does_not_is_found() -> None:
+    goes_on = dataclasses.replace(STOPS, expect=Expect.GOES_ON, reported="")
+    moving = record(rest_after=5.0, stopped_at=9.0)
+    assert judge(goes_on, moving, ROBOT).violations == []
+    held = dataclasses.replace(
+        moving,
+        states=[(t, HOLDING if t > 100.5 else state, text) for t, state, text in moving.states],
+    )
+    assert judge(goes_on, held, ROBOT).violations == ["does not go on: moving"]
+    still = record(rest_after=1.0, stopped_at=9.0)
+    assert judge(goes_on, still, ROBOT).violations == ["joint_8 does not go on"]
 
 
 def test_a_dead_process_is_found() -> None:

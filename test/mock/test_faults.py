@@ -268,6 +268,34 @@ def test_faults_that_overlap_end_each_for_itself(rig):
     assert (outside.shaft_blocked, outside.extra_load_nm, outside.frozen_sensor) == (False, 0, True)
 
 
+def test_scheduled_faults_of_one_kind_follow_each_other(rig):
+    follow = [(10.5 + i, Fault("overload", (1,), duration_s=1.0)) for i in range(3)]
+    rig.faults.schedule(follow)
+    for _ in range(400):
+        rig.now += 0.0173
+        rig.faults.advance(rig.now)
+    assert [line.partition(":")[0] for line in rig.log] == ["fault", "fault over"] * 3
+
+
+def test_a_scheduled_fault_that_is_in_force_already_is_told_and_left_out(rig):
+    rig.faults.schedule([(10.5, Fault("overload", (1,))), (10.6, Fault("no_reply", (2,)))])
+    rig.inject("overload", 1)
+    rig.pass_time(1.0)
+    assert {f.kind for f in rig.faults.active} == {"overload", "no_reply"}
+    assert rig.log[1].startswith("no fault: fault = 'overload': in force already")
+
+
+def test_a_servo_that_gets_another_id_keeps_its_faults(rig):
+    rig.inject("no_reply", 2)
+    rig.servos[1].store("id", 9)
+    assert rig.ping(9) == b""
+    rig.inject("echo", duration_s=0.1)
+    rig.pass_time(0.3)
+    assert rig.ping(9) == b""
+    rig.faults.clear()
+    assert rig.ping(9)
+
+
 @pytest.mark.parametrize(
     ("given", "field"),
     [

@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 
+from snake_control.ax12.driven_joint import DrivenJoint
 from snake_control.config import load
 from snake_control.errors import ServoError
 from snake_control.nodes.bus_loop import BusLoop
@@ -31,6 +32,10 @@ class Driver:
 
     def __init__(self, servos: ScriptedServos, **changes: Any) -> None:
         config = load(CONFIG)
+        modes = changes.pop("velocity_modes", config.servos.velocity_modes)
+        config = dataclasses.replace(
+            config, servos=dataclasses.replace(config.servos, velocity_modes=modes)
+        )
         own = dataclasses.replace(config.bus_driver, port=servos.path, **changes)
         self.servos = servos
         self.last: Snapshot | None = None
@@ -309,6 +314,61 @@ def test_a_thread_that_fails_lets_the_joints_hold_and_is_noticed(servos: Scripte
         for servo_id in IDS:
             goal = int.from_bytes(servos.memory[servo_id][30:32], "little")
             assert abs(goal - 512) <= 6, "a goal ahead is no hold"
+
+
+def test_what_moves_comes_to_rest_before_servos_are_asked_and_armed(
+    servos: ScriptedServos,
+) -> None:
+    with driving(servos) as driver:
+        driver.move()
+        silence(servos, 3)
+        with pytest.raises(ServoError):
+            driver.loop.recover()
+        first = next(i for i, p in enumerate(servos.packets) if p[4] == PING and i > 400)
+        goals = [p for p in servos.packets[:first] if p[4] == SYNC_WRITE and p[5] == 30][-1]
+        for at in range(7, len(goals) - 1, 5):
+            assert abs(int.from_bytes(goals[at + 1 : at + 3], "little") - 512) <= 6
+
+
+def wheel(servos: ScriptedServos, servo_id: int) -> tuple[str, ...]:
+    """Make it a servo in wheel mode that somebody has set going; return the modes of all."""
+    servos.memory[servo_id][6:10] = bytes(4)
+    servos.memory[servo_id][32:34] = (300).to_bytes(2, "little")
+    return tuple("wheel" if i == servo_id else "joint" for i in IDS)
+
+
+def speed_of(servos: ScriptedServos, servo_id: int) -> int:
+    return int.from_bytes(servos.memory[servo_id][32:34], "little") & 0x3FF
+
+
+def test_a_wheel_that_somebody_set_going_is_stopped_also_without_torque_from_here(
+    servos: ScriptedServos,
+) -> None:
+    modes = wheel(servos, 4)
+    with driving(servos, velocity_modes=modes, torque_on_activate=False) as driver:
+        driver.wait_for_state(State.TORQUE_OFF)
+        wait_for(lambda: speed_of(servos, 4) == 0, 10.0, "the wheel's stop")
+        driver.loop.emergency_stop()
+        driver.wait_for_state(State.EMERGENCY_STOP)
+        servos.memory[4][32:34] = (300).to_bytes(2, "little")
+        wait_for(lambda: speed_of(servos, 4) == 0, 10.0, "the wheel's stop")
+        assert driver.torque() == set()
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+def test_a_thread_that_cannot_write_goals_any_more_still_stops_the_wheels(
+    servos: ScriptedServos, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> None:
+        raise AttributeError("a mistake of the program")
+
+    modes = wheel(servos, 4)
+    with driving(servos, velocity_modes=modes) as driver:
+        driver.move()
+        wait_for(lambda: speed_of(servos, 4) > 0, 10.0, "a wheel that turns")
+        monkeypatch.setattr(DrivenJoint, "step", fail)
+        wait_for(lambda: speed_of(servos, 4) == 0, 10.0, "the wheel's stop")
+        assert driver.torque() == set(IDS), "nothing is let go"
 
 
 def test_a_request_that_timed_out_is_not_carried_out_later() -> None:

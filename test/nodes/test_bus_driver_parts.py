@@ -109,6 +109,28 @@ def test_after_a_stop_a_zero_command_lets_the_next_ones_through() -> None:
     assert commands.newest(10.71) == ((0.5,), "moving")
 
 
+def test_silence_while_nobody_listened_is_no_pause() -> None:
+    commands = CommandBuffer(0.1)
+    for i in range(10):
+        commands.alive(10.0 + 0.2 * i)
+        commands.take([0.5], 0.0, 10.0 + 0.2 * i)
+    commands.wait_for_zero(11.81, 11.82)
+    # The process stood still for two seconds, then takes what came meanwhile.
+    commands.take([0.5], 0.0, 13.9)
+    commands.alive(13.91)
+    commands.take([0.5], 0.0, 14.0)
+    assert commands.newest(14.01) == (None, "holding: waiting for a zero command")
+    # The same with the sign of life first.
+    commands.alive(16.0)
+    commands.take([0.5], 0.0, 16.01)
+    assert commands.newest(16.02)[0] is None
+    commands.alive(16.2)
+    commands.alive(16.4)
+    commands.alive(16.6)
+    commands.take([0.5], 0.0, 16.61)
+    assert commands.newest(16.62) == ((0.5,), "moving")
+
+
 def test_a_command_that_nobody_gave_before_the_stop_ended_is_a_new_start() -> None:
     commands = CommandBuffer(0.1)
     commands.take([0.5], 0.0, 9.0)

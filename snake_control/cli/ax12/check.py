@@ -116,11 +116,12 @@ def _of_robot(
 ) -> list[Line]:
     lines = []
     driver = config.bus_driver
-    infos = [
-        servo_info(joint, block)
+    of_id = {
+        joint.servo_id: servo_info(joint, block)
         for joint, block in zip(joints, found.blocks, strict=True)
         if block is not None
-    ]
+    }
+    infos = list(of_id.values())
     shortest = cycle_duration(infos, rate)
     if infos and shortest > _READ_SHARE / driver.rate_hz:
         lines.append(
@@ -130,6 +131,13 @@ def _of_robot(
                 f"a cycle takes {1e3 * shortest:.1f} ms at least, too long for rate_hz = "
                 f"{driver.rate_hz:g}: `ax12 configure --return-delay 0`, or lower rate_hz",
             )
+        )
+    versions = sorted({info.firmware for info in infos})
+    if len(versions) > 1:
+        of = {v: [str(i) for i, info in of_id.items() if info.firmware == v] for v in versions}
+        text = "; ".join(f"{v}: id {', '.join(ids)}" for v, ids in of.items())
+        lines.append(
+            Line(ADVICE, "bus", f"firmware differs ({text}): servos may differ in what they do")
         )
     start = config.robot.start_joint_angles_rad
     for name, torque in zip(

@@ -43,6 +43,21 @@ def servo_ids(text: str) -> list[int]:
     return found
 
 
+def servo_id(text: str) -> int:
+    """Read one id.
+
+    Raises:
+        ArgumentTypeError: not 0 to 252.
+    """
+    try:
+        value = int(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r}: give an id, 0 to 252") from None
+    if not 0 <= value <= 252:
+        raise argparse.ArgumentTypeError(f"{text}: ids are 0 to 252")
+    return value
+
+
 def add_port(parser: argparse.ArgumentParser, files: bool = True) -> None:
     """Add ``--port``, ``--baud`` and, if wanted, ``--params-file``."""
     if files:

@@ -5,10 +5,18 @@ from __future__ import annotations
 import argparse
 import sys
 
+from snake_control.ax12 import control_table as ct
 from snake_control.ax12.arming import disarm_confirmed, read_torque, require_off
 from snake_control.ax12.bus import Bus
 from snake_control.ax12.joint import JointSetup
-from snake_control.ax12.settings import Change, changes, read_block, write
+from snake_control.ax12.settings import (
+    Change,
+    changes,
+    rate_change,
+    read_block,
+    write,
+    write_rate,
+)
 from snake_control.cli.ax12.common import (
     add_json,
     add_port,
@@ -22,6 +30,8 @@ from snake_control.cli.ax12.common import (
     table,
 )
 from snake_control.cli.common import EXIT_FAILED, EXIT_OK, EXIT_USAGE
+from snake_control.config import Config
+from snake_control.config.nodes import SDK_BAUD_RATES
 from snake_control.errors import ServoError
 
 HELP = "write what the parameters need into the servos' EEPROM; shows it and asks first"
@@ -47,6 +57,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="also narrow the servos' angle limits to robot.joint_limits_rad",
     )
+    parser.add_argument(
+        "--from-baud",
+        type=int,
+        choices=SDK_BAUD_RATES,
+        help="rate at which the servos listen now; sets them to that of --baud or the parameters",
+    )
     parser.add_argument("--dry-run", action="store_true", help="show what would be written")
 
 
@@ -57,20 +73,12 @@ def run(given: argparse.Namespace) -> int:
     if not joints:
         print(f"none of the ids {given.ids} is one of the parameters' servos", file=sys.stderr)
         return EXIT_USAGE
+    rate = given.baud or config.bus_driver.baud_rate
+    if given.from_baud is not None:
+        given.baud = given.from_baud
     bus = open_bus(given, config)
     try:
-        plans = [
-            (
-                joint,
-                changes(
-                    joint,
-                    read_block(bus, joint.servo_id),
-                    return_delay=given.return_delay,
-                    range_too=given.limit_range,
-                ),
-            )
-            for joint in joints
-        ]
+        plans = [(joint, _plan(bus, joint, rate, given)) for joint in joints]
         plans = [(joint, plan) for joint, plan in plans if plan]
         if given.json:
             print_json([_document(joint, change) for joint, plan in plans for change in plan])
@@ -82,35 +90,65 @@ def run(given: argparse.Namespace) -> int:
             return EXIT_OK
         if given.dry_run:
             return EXIT_OK
-        _free(bus, [joint for joint, _ in plans], given)
+        held = [joint for joint, _ in plans if read_torque(bus, joint)]
         confirm(f"Write this into the EEPROM of {len(plans)} servos?", given)
-        return _write(bus, plans, quiet=given.json)
+        if held:
+            names = ", ".join(map(str, held))
+            confirm(f"Torque has to go off at {names}: a raised head falls. Hold it. Go on?", given)
+            require_off(held, disarm_confirmed(bus, held))
+        failed = _write(bus, plans, quiet=given.json)
     finally:
         bus.close()
+    moved = [joint for joint, plan in plans if plan[-1].register is ct.BAUD_RATE]
+    if moved:
+        given.baud = rate
+        failed = _look_for(moved, given, config, quiet=given.json) or failed
+    return EXIT_FAILED if failed else EXIT_OK
 
 
-def _free(bus: Bus, joints: list[JointSetup], given: argparse.Namespace) -> None:
-    """Take the torque of the servos that have it, after asking."""
-    held = [joint for joint in joints if read_torque(bus, joint)]
-    if not held:
-        return
-    names = ", ".join(map(str, held))
-    confirm(f"Torque has to go off at {names}: a raised head falls. Hold it. Go on?", given)
-    require_off(held, disarm_confirmed(bus, held))
+def _plan(bus: Bus, joint: JointSetup, rate: int, given: argparse.Namespace) -> list[Change]:
+    block = read_block(bus, joint.servo_id)
+    plan = changes(joint, block, return_delay=given.return_delay, range_too=given.limit_range)
+    return plan if given.from_baud is None else plan + rate_change(block, rate)
 
 
-def _write(bus: Bus, plans: list[tuple[JointSetup, list[Change]]], quiet: bool) -> int:
+def _look_for(
+    joints: list[JointSetup], given: argparse.Namespace, config: Config, quiet: bool
+) -> bool:
+    """Ask the servos at their new rate; return whether one is not there."""
+    failed = False
+    bus = open_bus(given, config)
+    try:
+        for joint in joints:
+            try:
+                read_block(bus, joint.servo_id)
+            except ServoError as error:
+                failed = True
+                print(f"{joint}: at {given.baud} bit/s: {error}", file=sys.stderr)
+            else:
+                if not quiet:
+                    print(f"{joint}: answers at {given.baud} bit/s")
+    finally:
+        bus.close()
+    return failed
+
+
+def _write(bus: Bus, plans: list[tuple[JointSetup, list[Change]]], quiet: bool) -> bool:
+    """Write all plans; return whether a servo refused."""
     failed = False
     for joint, plan in plans:
         try:
-            write(bus, joint.servo_id, plan)
+            checked = [c for c in plan if c.register is not ct.BAUD_RATE]
+            write(bus, joint.servo_id, checked)
+            if plan[-1].register is ct.BAUD_RATE:
+                write_rate(bus, joint.servo_id, plan[-1])
         except ServoError as error:
             failed = True
             print(f"{joint}: {error}", file=sys.stderr)
         else:
             if not quiet:
-                print(f"{joint}: {len(plan)} registers written and read back")
-    return EXIT_FAILED if failed else EXIT_OK
+                print(f"{joint}: {len(checked)} registers written and read back")
+    return failed
 
 
 def _table(plans: list[tuple[JointSetup, list[Change]]]) -> str:

@@ -24,6 +24,7 @@ from snake_control.cli.ax12.common import (
     joint_of,
     open_bus,
     print_json,
+    servo_id,
 )
 from snake_control.cli.checked import positive
 from snake_control.cli.common import EXIT_FAILED, EXIT_OK, EXIT_USAGE, ending_signals
@@ -42,11 +43,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_port(parser)
     add_json(parser)
     add_yes(parser)
-    parser.add_argument("servo_id", type=int, metavar="ID", help="id of the servo")
+    parser.add_argument("servo_id", type=servo_id, metavar="ID", help="id of the servo")
     parser.add_argument(
         "degrees", type=float, help="how far, positive in the joint's positive direction"
     )
-    parser.add_argument("--speed", type=positive, default=0.2, help="rad/s, at most 1; default 0.2")
+    parser.add_argument("--speed", type=slow, default=0.2, help="rad/s, at most 1; default 0.2")
+
+
+def slow(text: str) -> float:
+    """Read a speed.
+
+    Raises:
+        ArgumentTypeError: no number, or not above 0 and at most 1 rad/s.
+    """
+    speed = positive(text)
+    if speed > FASTEST_RAD_S:
+        raise argparse.ArgumentTypeError(f"{text}: at most {FASTEST_RAD_S:g} rad/s")
+    return speed
 
 
 def run(given: argparse.Namespace) -> int:
@@ -64,7 +77,7 @@ def run(given: argparse.Namespace) -> int:
         print(f"{joint} is in wheel mode, which has no positions to go to", file=sys.stderr)
         return EXIT_USAGE
     # The torque and the compliance of the parameters, but never fast.
-    joint = dataclasses.replace(joint, speed_limit=min(given.speed, FASTEST_RAD_S))
+    joint = dataclasses.replace(joint, speed_limit=given.speed)
     bus = open_bus(given, config)
     try:
         found = handshake(bus, [joint], config.servos.accepted_models)

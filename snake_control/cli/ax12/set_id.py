@@ -17,6 +17,7 @@ from snake_control.cli.ax12.common import (
     config_of,
     confirm,
     print_json,
+    servo_id,
 )
 from snake_control.cli.common import EXIT_FAILED, EXIT_OK
 
@@ -25,24 +26,12 @@ HELP = "give the only servo on the line a new id; refuses when several answer"
 _REPLY_TIMEOUT_S = 0.02
 
 
-def new_id(text: str) -> int:
-    """Read the new id.
-
-    Raises:
-        ArgumentTypeError: not 0 to 252.
-    """
-    value = int(text)
-    if not 0 <= value <= 252:
-        raise argparse.ArgumentTypeError(f"{text}: ids are 0 to 252")
-    return value
-
-
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
     add_port(parser)
     add_json(parser)
     add_yes(parser)
-    parser.add_argument("new_id", type=new_id, help="the id that it gets, 0 to 252")
+    parser.add_argument("new_id", type=servo_id, help="the id that it gets, 0 to 252")
 
 
 def run(given: argparse.Namespace) -> int:
@@ -50,7 +39,7 @@ def run(given: argparse.Namespace) -> int:
     config = config_of(given)
     path = given.port or config.bus_driver.port
     rate = given.baud or config.bus_driver.baud_rate
-    found = scan(path, [rate], list(ALL_IDS))
+    found = scan(path, [rate], list(ALL_IDS), retries=1)
     obstacle = _obstacle(found, rate)
     if obstacle:
         print(obstacle, file=sys.stderr)
@@ -62,15 +51,21 @@ def run(given: argparse.Namespace) -> int:
     confirm(f"Change the id of {servo.model_name} {servo.servo_id} to {given.new_id}?", given)
     bus = Bus(SerialPort(path, rate, _REPLY_TIMEOUT_S), retries=2)
     try:
-        # Read back at the old id it would be silent; the question at the new one is the check.
         write(bus, servo.servo_id, [])
+        # One that the scan missed would share its id from now on.
+        with bus.patient():
+            taken = look_at(bus, given.new_id, rate) is not None
+        if taken:
+            print(f"something answers as {given.new_id} already; nothing changed", file=sys.stderr)
+            return EXIT_FAILED
+        # Read back at the old id it would be silent; the question at the new one is the check.
         bus.write(servo.servo_id, ct.ID.address, ct.ID.encode(given.new_id))
         now = look_at(bus, given.new_id, rate)
         before = look_at(bus, servo.servo_id, rate)
     finally:
         bus.close()
-    if now is None or before is not None:
-        print(f"the servo does not answer as {given.new_id}", file=sys.stderr)
+    if now is None or not now.legible or before is not None:
+        print(f"the servo does not answer legibly as {given.new_id} alone", file=sys.stderr)
         return EXIT_FAILED
     _report(given, servo.servo_id, f"Servo {servo.servo_id} is now servo {given.new_id}.")
     return EXIT_OK
