@@ -26,7 +26,8 @@ def run(scenarios: Sequence[Scenario], tries: int = 2) -> list[tuple[Scenario, O
                 try:
                     outcome = rig.run(scenario)
                 except AssertionError as error:
-                    outcome = Outcome(violations=[f"not carried out: {error}".splitlines()[0]])
+                    first, *rest = f"not carried out: {error}".splitlines()
+                    outcome = Outcome(violations=[first], timeline=rest)
                 if not outcome.violations:
                     break
                 words = str(outcome).replace("\n", "\n    ")

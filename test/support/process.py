@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 import subprocess
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+
+_ABORT_S = 5.0
 
 
 class Process:
@@ -36,7 +39,7 @@ class Process:
                 stdout=stream,
                 stderr=subprocess.STDOUT,
                 cwd=cwd,
-                env=dict(environment),
+                env={"PYTHONFAULTHANDLER": "1", **environment},
             )
         self.pid = self._popen.pid
 
@@ -79,11 +82,16 @@ class Process:
         """Wait until it has ended and return its exit code.
 
         Raises:
-            AssertionError: it still runs after ``timeout`` seconds; shows what it printed.
+            AssertionError: it still runs after ``timeout`` seconds; it is ended, and shows what it
+                printed and where each of its threads was.
         """
         try:
             return self._popen.wait(timeout)
         except subprocess.TimeoutExpired:
+            # Python's fault handler writes the stacks.
+            self._send(signal.SIGABRT)
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                self._popen.wait(_ABORT_S)
             raise AssertionError(f"did not end within {timeout} s\n{self.report()}") from None
 
     def report(self, lines: int = 40) -> str:
