@@ -14,7 +14,7 @@ PACKETS ?= 1000000
 PYTHON ?=
 export PYTHON
 
-.PHONY: help demo test lint bench faults fuzz clean setup build FORCE
+.PHONY: help demo test lint bench faults fuzz heads clean setup build FORCE
 
 help:
 	@printf '%s\n' \
@@ -24,7 +24,8 @@ help:
 	  'make lint    style, types and the import rules' \
 	  'make bench   time control step, dynamics and lockstep; results in out/bench.json' \
 	  'make faults  try driver and mock with every fault; table in out/faults.md  SCENARIO=name for one' \
-	  'make fuzz    a million random packets against the mock and the driver  PACKETS=n' \
+	  'make heads   200 head trajectories and 100 hostile references in lockstep; table in out/heads.md' \
+  'make fuzz    a million random packets against the mock and the driver  PACKETS=n' \
 	  'make clean   remove all that the others made' \
 	  '' \
 	  'Each does the set-up that it needs, once: packages in .venv, messages in install.' \
@@ -84,6 +85,9 @@ faults: build/ready
 
 fuzz: build/ready
 	@. scripts/env.sh && PYTHONPATH=.:test:$$PYTHONPATH exec python -m fuzz.run --packets $(PACKETS)
+
+heads: build/ready
+	@. scripts/env.sh && PYTHONPATH=.:test:$$PYTHONPATH exec python -m heads.campaign
 
 clean:
 	rm -rf .venv build install log out .pytest_cache .ruff_cache .mypy_cache \

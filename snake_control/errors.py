@@ -54,6 +54,10 @@ class ModelError(SnakeError, ValueError):
     """A model quantity was asked for with an argument of wrong shape or without a finite value."""
 
 
+class TrajectoryError(SnakeError, ValueError):
+    """A motion of the head that cannot be: not finite, times in no order, or out of reach."""
+
+
 class SubTaskError(SnakeError, RuntimeError):
     """A sub-task of somebody else's raised an error or gave an answer of the wrong form.
 

@@ -10,6 +10,20 @@ from pathlib import Path
 import pytest
 
 _REAL_TIME = ("nodes", "cli", "faults", "launch_files")
+_ANY_TIME = (
+    "cli/test_demo_arguments.py",
+    "cli/test_evaluate.py",
+    "cli/test_experiment.py",
+    "cli/test_memory.py",
+    "cli/test_progress.py",
+    "cli/test_scp_study.py",
+    "faults/test_check.py",
+    "nodes/test_bus_decision.py",
+    "nodes/test_bus_driver_parts.py",
+    "nodes/test_conversions.py",
+    "nodes/test_inputs.py",
+)
+"""Of these folders, what does not mind waiting."""
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
@@ -20,7 +34,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     """
     here = Path(__file__).parent
     for item in items:
-        if item.path.relative_to(here).parts[0] in _REAL_TIME:
+        path = item.path.relative_to(here)
+        if path.parts[0] in _REAL_TIME and path.as_posix() not in _ANY_TIME:
             item.add_marker(pytest.mark.real_time)
             if config.pluginmanager.hasplugin("rerunfailures"):
                 item.add_marker(pytest.mark.flaky(reruns=1))

@@ -10,7 +10,7 @@ import numpy as np
 from snake_control.cli.common import EXIT_FAILED, EXIT_OK
 from snake_control.experiment.series import Step
 
-FOLLOWING = ("tracking", "limited")
+FOLLOWING = ("tracking", "limited", "recovering")
 """Status words of a controller that follows its reference."""
 
 _AFTER_FALL_S = 2.0
@@ -87,6 +87,9 @@ class RunJudge:
         words = f"scp_controller did not follow the reference{since}: {trouble.text}"
         if case == 1 and status in _FINDINGS_OF_CASE_1:
             return Outcome(f"duration reached; {words}", EXIT_OK) if over else None
+        if fell_at_s is not None:
+            # Whatever the controller makes of a robot that lies.
+            return None
         lasting = now - trouble.since > (_START_S if t_s is None else _TROUBLE_S)
         return Outcome(words, EXIT_FAILED) if lasting else None
 

@@ -31,6 +31,7 @@ from snake_control.config.parameter import Parameter
 from snake_control.config.presets import PRESETS
 from snake_control.config.robot import RobotConfig, ServosConfig
 from snake_control.config.sub_tasks import BASE_SUB_TASKS, HEAD_SUB_TASKS
+from snake_control.config.supervisor import SupervisorConfig
 from snake_control.config.yaml_file import matches, read_sections
 
 __all__ = [
@@ -47,6 +48,7 @@ __all__ = [
     "RobotConfig",
     "ScpControllerConfig",
     "ServosConfig",
+    "SupervisorConfig",
     "TrajectoryGeneratorConfig",
     "from_parameters",
     "is_ros_parameter",

@@ -18,6 +18,7 @@ from snake_control.config.nodes import (
 )
 from snake_control.config.parameter import Parameter, parameters
 from snake_control.config.robot import RobotConfig, ServosConfig
+from snake_control.config.supervisor import SupervisorConfig
 from snake_control.config.yaml_file import matches, read_sections
 from snake_control.errors import ConfigError
 
@@ -25,6 +26,7 @@ _SHARED_GROUPS: dict[str, type] = {
     "robot": RobotConfig,
     "servos": ServosConfig,
     "controller": ControllerConfig,
+    "supervisor": SupervisorConfig,
 }
 _NODE_GROUPS: dict[str, type] = {
     "bus_driver": BusDriverConfig,
@@ -36,7 +38,7 @@ _NODE_GROUPS: dict[str, type] = {
 _SHARED_GROUPS_OF_NODE: dict[str, tuple[str, ...]] = {
     "bus_driver": ("robot", "servos"),
     "pose_input": (),
-    "scp_controller": ("robot", "controller"),
+    "scp_controller": ("robot", "controller", "supervisor"),
     "trajectory_generator": (),
     "mock_bus": ("robot", "servos"),
 }
@@ -52,6 +54,7 @@ class Config:
     robot: RobotConfig
     servos: ServosConfig
     controller: ControllerConfig
+    supervisor: SupervisorConfig
     bus_driver: BusDriverConfig
     pose_input: PoseInputConfig
     scp_controller: ScpControllerConfig
@@ -65,8 +68,9 @@ def load(
     """Read parameter files for one robot, later ones winning over earlier ones.
 
     Sections that several kinds of nodes match (``/**``) may hold the shared groups ``robot``,
-    ``servos`` and ``controller`` and any node's own parameters; a section of one node holds what
-    that node knows. Sections of other namespaces and of foreign nodes are left alone.
+    ``servos``, ``controller`` and ``supervisor``, and any node's own parameters; a section of one
+    node holds what that node knows. Sections of other namespaces and of foreign nodes are left
+    alone.
 
     Args:
         paths: ROS parameter files.

@@ -16,11 +16,15 @@ class Reference:
 
     Attributes:
         w_d: [x_h, y_h, z_h, R, P, Y], (6,) [m, rad].
-        w_d_dot: its time derivative (rates of R, P, Y, no angular velocity), (6,) [m/s, rad/s].
+        w_d_dot: its time derivative (rates of R, P, Y, no angular velocity), (6,) [m/s, rad/s];
+            at full speed, where the motion is slowed.
         w_d_ddot: the second time derivative, which torque control feeds forward, (6,)
             [m/s^2, rad/s^2]; default 0.
+        time_scale: how much slower than planned the reference moves at present, 0..1: its rate is
+            time_scale * w_d_dot.
     """
 
     w_d: Array
     w_d_dot: Array
     w_d_ddot: Array = dataclasses.field(default_factory=lambda: np.zeros(6))
+    time_scale: float = 1.0

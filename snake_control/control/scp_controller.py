@@ -145,17 +145,14 @@ class ScpController:
             ModelError: q has the wrong shape or is not finite.
         """
         del q_dot, t
-        posture = Posture(self._robot, q)
-        q = posture.g.q
-        error: list[float] = (q[:6] - reference.w_d).tolist()
-        error[3:] = map(wrap_angle, error[3:])
-        for i in self._not_moved:
-            error[i] = 0.0
-        rates = reference.w_d_dot.tolist()
-        w_dot = [rates[i] - K * error[i] for i, K in zip(self._w, self._K, strict=True)]
-        phi_tilde_dot_d = self._sub_tasks.velocities(posture, w_dot)
+        posture, error = self.look(q, reference)
+        w_dot = [
+            reference.time_scale * forward + back
+            for forward, back in zip(self.feedforward(reference), self.feedback(error), strict=True)
+        ]
+        phi_tilde_dot_d = self.sub_tasks(posture, w_dot)
         u = posture.k.joint_velocities(w_dot, phi_tilde_dot_d.tolist())
-        limited = self._limits.apply(q[6:], u)
+        limited = self._limits.apply(posture.g.q[6:], u)
         return ControlResult(
             posture=posture,
             w_d=reference.w_d,
@@ -168,3 +165,32 @@ class ScpController:
             speed_limited=limited.speed_limited,
             range_limited=limited.range_limited,
         )
+
+    # The parts of a step, for whoever decides more than the law (22) does.
+
+    def look(self, q: ArrayLike, reference: Reference) -> tuple[Posture, list[float]]:
+        """Return the posture and the error w - w_d, angles wrapped, 0 for what is not moved."""
+        posture = Posture(self._robot, q)
+        error: list[float] = (posture.g.q[:6] - reference.w_d).tolist()
+        error[3:] = map(wrap_angle, error[3:])
+        for i in self._not_moved:
+            error[i] = 0.0
+        return posture, error
+
+    def feedforward(self, reference: Reference) -> list[float]:
+        """Return w_d_dot, of what the controller moves."""
+        rates = reference.w_d_dot.tolist()
+        return [rates[i] for i in self._w]
+
+    def feedback(self, error: list[float]) -> list[float]:
+        """Return -K e, of what the controller moves."""
+        return [-K * error[i] for i, K in zip(self._w, self._K, strict=True)]
+
+    @property
+    def scps_follow_head(self) -> bool:
+        """Whether the SCPs' velocities depend on the head's: not those of (25), (27)."""
+        return self._sub_tasks.follows_head
+
+    def sub_tasks(self, posture: Posture, w_dot: list[float]) -> Array:
+        """Return the SCP velocities of (25), (27) for a velocity of the head."""
+        return self._sub_tasks.velocities(posture, w_dot)

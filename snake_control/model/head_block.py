@@ -36,6 +36,8 @@ class HeadBlock:
         inverse: of the block: four rows of four, one for each head joint of theta_bar; damped near
             a singular posture.
         damping: see ``damping_of``; 0 where the inverse is exact.
+        regularity: 1 / Frobenius norm of the exact inverse, 0 where there is none: no larger than
+            the smallest singular value, no smaller than half of it.
         log_determinant: of ``determinant``, singular values raised to the damping's threshold.
     """
 
@@ -49,7 +51,9 @@ class HeadBlock:
         self._adjugate = list(zip(a, b, c, d, strict=True))
         self._sign = math.copysign(1.0, signed)
         self.determinant = abs(signed)
-        if math.hypot(*a, *b, *c, *d) < self.determinant / EPSILON:
+        norm = math.hypot(*a, *b, *c, *d)
+        self.regularity = self.determinant / norm if norm > 0.0 else 0.0
+        if norm < self.determinant / EPSILON:
             # Then no singular value is as small as EPSILON.
             self.inverse = _scaled(self._adjugate, 1.0 / signed)
             self.damping = 0.0

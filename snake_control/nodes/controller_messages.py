@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from snake_interfaces.msg import ControllerState, JointVelocityCommand
 
 from snake_control.config import ControllerConfig, RobotConfig
-from snake_control.control.scp_controller import ControlResult
+from snake_control.control.barriers import Bound, Limit
+from snake_control.control.supervisor import SupervisedResult
 from snake_control.model.rotation import wrap
 
 Array = NDArray[np.float64]
@@ -29,6 +30,8 @@ class Step:
         stamp_ns: time of the step.
         status: ``ControllerState.STATUS_*``.
         text: the reason, naming the input, the joint or the limit.
+        reasons: ``ControllerState.REASON_*`` of the text.
+        reference_scale: how fast the reference may go on, 0..1.
         phi, w, w_d, w_d_dot: inputs as far as they could be used, else NaN.
         controlled: components of w, from 0, that the controller moves (not all, if planar).
         result: what the control law decided; ``None`` if the joints are commanded to rest.
@@ -42,8 +45,10 @@ class Step:
     w_d_dot: Array = dataclasses.field(default_factory=_nothing)
     status: int = ControllerState.STATUS_WAITING
     text: str = ""
+    reasons: tuple[int, ...] = ()
+    reference_scale: float = 0.0
     controlled: tuple[int, ...] = (0, 1, 2, 3, 4, 5)
-    result: ControlResult | None = None
+    result: SupervisedResult | None = None
     joint_states_age: float = math.inf
     head_age: float = math.inf
     reference_age: float = math.inf
@@ -67,24 +72,67 @@ class Step:
         return Step(stamp_ns, np.full(robot.joints, math.nan), controlled=robot.controlled)
 
 
-def judge(step: Step, result: ControlResult, robot: RobotConfig) -> None:
-    """Enter a control law's answer, with a status that names what kept it from its reference."""
-    names = robot.joint_names
+REASON_OF_LIMIT = {
+    Limit.JOINT_SPEED: ControllerState.REASON_JOINT_SPEED,
+    Limit.JOINT_RANGE: ControllerState.REASON_JOINT_RANGE,
+    Limit.FALL: ControllerState.REASON_FALL,
+    Limit.SINGULAR_BODY: ControllerState.REASON_SINGULAR_BODY,
+    Limit.SINGULAR_HEAD: ControllerState.REASON_SINGULAR_HEAD,
+}
+
+
+def judge(step: Step, result: SupervisedResult, robot: RobotConfig) -> None:
+    """Enter the supervisor's answer, with a status that names what kept it from its reference."""
     step.result = result
-    found = []
+    step.reference_scale = result.reference_scale
+    found: list[tuple[int, str]] = []
+    if result.bound is not None:
+        found.append((REASON_OF_LIMIT[result.bound.limit], _slowed(result, result.bound, robot)))
     if result.damping > 0.0:
-        found.append(
+        text = (
             f"singular head posture (B_tilde): {100 * result.damping:.0f} % of the motion in its "
             "weakest direction is given up"
         )
-    if result.speed_limited:
-        joints = ", ".join(names[j - 1] for j in result.speed_limited)
-        found.append(f"{joints} at its speed limit: all scaled to {result.speed_scale:.2f}")
-    if result.range_limited:
-        joints = ", ".join(names[j - 1] for j in result.range_limited)
-        found.append(f"{joints} at the end of its range: no velocity outwards")
-    step.status = ControllerState.STATUS_LIMITED if found else ControllerState.STATUS_TRACKING
-    step.text = "; ".join(found) or "tracking"
+        found.append((ControllerState.REASON_SINGULAR_HEAD, text))
+    if result.accelerating:
+        found.append((ControllerState.REASON_JOINT_ACCELERATION, "speeding up"))
+    limited = bool(found)
+    for limit in result.escaping:
+        found.append((REASON_OF_LIMIT[limit], f"the SCPs get away from: {_near(limit, result)}"))
+    step.status = (
+        ControllerState.STATUS_HOLDING
+        if result.holding
+        else ControllerState.STATUS_LIMITED
+        if limited
+        else ControllerState.STATUS_RECOVERING
+        if found
+        else ControllerState.STATUS_TRACKING
+    )
+    step.text = "; ".join(text for _, text in found) or "tracking"
+    step.reasons = tuple(dict.fromkeys(reason for reason, _ in found))
+
+
+def _slowed(result: SupervisedResult, bound: Bound, robot: RobotConfig) -> str:
+    """Return what a limit does to the motion."""
+    joints = ", ".join(robot.joint_names[joint - 1] for joint in bound.joints)
+    what = {
+        Limit.JOINT_SPEED: f"{joints} at its speed limit",
+        Limit.JOINT_RANGE: f"{joints} near the end of its range",
+    }.get(bound.limit, _near(bound.limit, result))
+    if result.holding:
+        return f"{what}: the head rests"
+    return f"{what}: the head's motion scaled to {result.speed_scale:.2f}"
+
+
+def _near(limit: Limit, result: SupervisedResult) -> str:
+    if limit is Limit.FALL:
+        return f"falling (d_min {1e3 * result.d_min:.1f} mm)"
+    if limit is Limit.SINGULAR_BODY:
+        shape = result.singular_shape
+        return f"singular shape of the body ({shape.kind}, nearness {shape.nearness:.3f})"
+    if limit is Limit.SINGULAR_HEAD:
+        return f"singular head posture (regularity {result.posture.k.head.regularity:.3f})"
+    return "the end of a joint's range"
 
 
 def too_far(step: Step, max_position_error_m: float, max_rotation_error_rad: float) -> str:
@@ -143,6 +191,8 @@ class ControllerMessages:
         _stamp(message, step.stamp_ns)
         message.status = step.status
         message.text = step.text
+        message.reasons = step.reasons
+        message.reference_scale = step.reference_scale
         message.experiment_case = gains.case
         message.preset = gains.preset
         message.w = step.w
@@ -158,7 +208,7 @@ class ControllerMessages:
         if result is None:
             message.u_unlimited = message.u = self._at_rest
             message.phi_tilde_dot_d = self._no_scp
-            message.speed_scale = 1.0
+            message.speed_scale = message.feedback_scale = message.scp_scale = 1.0
             message.speed_limited = message.range_limited = []
             message.v_h = message.v_b1 = message.d_min = math.nan
             message.sigma_min_b_tilde = message.sigma_min_a_hat = math.nan
@@ -169,6 +219,8 @@ class ControllerMessages:
             message.u = _array(result.u)
             message.phi_tilde_dot_d = _array(result.phi_tilde_dot_d)
             message.speed_scale = float(result.speed_scale)
+            message.feedback_scale = float(result.feedback_scale)
+            message.scp_scale = float(result.scp_scale)
             message.speed_limited = [self._names[j - 1] for j in result.speed_limited]
             message.range_limited = [self._names[j - 1] for j in result.range_limited]
             message.v_h = float(result.V_h)

@@ -144,6 +144,7 @@ def reference_message(reference: Reference, stamp: int, frame_id: str) -> HeadRe
     message = HeadReference(header=header(stamp, frame_id), pose=pose_message(reference.w_d))
     message.twist.linear = vector(reference.w_d_dot[:3])
     message.twist.angular = vector(rpy_rate_map(reference.w_d[3:]) @ reference.w_d_dot[3:])
+    message.time_scale = float(reference.time_scale)
     return message
 
 
@@ -157,7 +158,11 @@ def reference_from(message: HeadReference, frame_id: str) -> Reference:
     w_d = pose_array(message.pose)
     linear, angular = array(message.twist.linear), array(message.twist.angular)
     require_finite("twist", linear, angular)
-    return Reference(w_d, np.concatenate([linear, rpy_rates(w_d[3:], angular)]))
+    scale = message.time_scale
+    if not 0.0 <= scale <= 1.0:
+        raise MessageError(f"its time_scale is {scale}, allowed: 0 to 1")
+    rates = np.concatenate([linear, rpy_rates(w_d[3:], angular)])
+    return Reference(w_d, rates, time_scale=scale)
 
 
 def joint_motion(message: JointState, names: Sequence[str]) -> tuple[Array, Array]:

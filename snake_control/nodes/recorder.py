@@ -28,8 +28,15 @@ STATUS_WORDS = {
     ControllerState.STATUS_INVALID: "invalid",
     ControllerState.STATUS_FAULT: "fault",
     ControllerState.STATUS_ERROR_TOO_LARGE: "error too large",
+    ControllerState.STATUS_RECOVERING: "recovering",
+    ControllerState.STATUS_HOLDING: "holding",
+    ControllerState.STATUS_STOPPED: "stopped",
 }
-FOLLOWING = (ControllerState.STATUS_TRACKING, ControllerState.STATUS_LIMITED)
+FOLLOWING = (
+    ControllerState.STATUS_TRACKING,
+    ControllerState.STATUS_LIMITED,
+    ControllerState.STATUS_RECOVERING,
+)
 
 _GROUND_TRUTH_WAIT_NS = 500_000_000
 _GROUND_TRUTH_KEPT = 100

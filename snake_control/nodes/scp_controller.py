@@ -16,18 +16,18 @@ from numpy.typing import NDArray
 from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
 from rclpy.node import Node
-from snake_interfaces.msg import ControllerState
+from snake_interfaces.msg import BusState, ControllerState
 from std_srvs.srv import SetBool
 
 from snake_control.config import Config
 from snake_control.control.reference import Reference
-from snake_control.control.scp_controller import ScpController
+from snake_control.control.supervisor import Supervisor
 from snake_control.errors import SnakeError
 from snake_control.model.rotation import unwrap_near
 from snake_control.nodes import markers, topics
 from snake_control.nodes.controller_messages import ControllerMessages, Step, judge, too_far
 from snake_control.nodes.conversions import head_motion, joint_motion, reference_from
-from snake_control.nodes.inputs import Fault, Input
+from snake_control.nodes.inputs import Fault, Input, Problem
 from snake_control.nodes.parameters import NodeParameters
 from snake_control.nodes.process import run
 
@@ -42,11 +42,24 @@ _STATUS_OF_FAULT = {
 # What arithmetic raises where a posture, or a sub-task of somebody else's, has no answer.
 _NO_ANSWER = (SnakeError, ArithmeticError, np.linalg.LinAlgError)
 
-_GOOD = (ControllerState.STATUS_TRACKING, ControllerState.STATUS_LIMITED)
+_REASON_OF_FAULT = {
+    Fault.WAITING: ControllerState.REASON_NO_INPUT,
+    Fault.STALE: ControllerState.REASON_STALE_INPUT,
+    Fault.INVALID: ControllerState.REASON_INVALID_INPUT,
+}
+_GOOD = (
+    ControllerState.STATUS_TRACKING,
+    ControllerState.STATUS_LIMITED,
+    ControllerState.STATUS_RECOVERING,
+)
+# What a driver does that takes commands; a dry run takes them for show.
+_TAKES = (BusState.STATE_MOVING, BusState.STATE_DRY_RUN)
+# A driver that says nothing for so long is not heard; its joint states are old then, too.
+_BUS_SILENT_NS = 1_000_000_000
 
 
 class ScpControllerNode(Node):
-    """Runs ``ScpController`` at a fixed rate on the newest inputs."""
+    """Runs ``Supervisor`` at a fixed rate on the newest inputs."""
 
     def __init__(self, **overrides: Any) -> None:
         super().__init__("scp_controller", **overrides)
@@ -54,15 +67,17 @@ class ScpControllerNode(Node):
             self,
             "scp_controller",
             self._on_parameters,
-            lambda config: ScpController(config.robot, config.controller),
+            _supervisor,
         )
         config = self._configured.config
         self._robot = config.robot
         self._own = own = config.scp_controller
         self._gains = config.controller
-        self._controller: ScpController = self._configured.prepared
+        self._controller: Supervisor = self._configured.prepared
         self._enabled = own.enabled
         self._status: int | None = None
+        self._bus: tuple[int, BusState] | None = None
+        self._stopped = ""
         self._messages = ControllerMessages(config.robot, own.frame_id)
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._origin_ns = self._steady.now().nanoseconds
@@ -92,6 +107,9 @@ class ScpControllerNode(Node):
         ):
             self.create_subscription(topic.type, topic.name, source.receive, topic.newest_only)
 
+        t = topics.BUS_STATE
+        self.create_subscription(t.type, t.name, self._hear_bus, t.newest_only)
+
         t = topics.JOINT_VELOCITY_COMMAND
         self._command = self.create_publisher(t.type, t.name, t.qos)
         t = topics.CONTROLLER_STATE
@@ -102,6 +120,9 @@ class ScpControllerNode(Node):
         self.create_timer(1.0 / own.rate_hz, self._on_timer, clock=self._steady)
         self.create_timer(_MARKERS_PERIOD_S, self._publish_markers, clock=self._steady)
 
+    def _hear_bus(self, message: BusState) -> None:
+        self._bus = (self._steady.now().nanoseconds, message)
+
     def _on_parameters(self, config: Config) -> None:
         self._gains = config.controller
         self._controller = self._configured.prepared
@@ -109,6 +130,7 @@ class ScpControllerNode(Node):
 
     def _on_enable(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
         self._enabled = request.data
+        self._stopped = ""
         response.success = True
         response.message = "enabled" if self._enabled else "disabled: zero velocity"
         self.get_logger().info(response.message)
@@ -127,6 +149,8 @@ class ScpControllerNode(Node):
             self._command.publish(self._messages.command(step))
             state = self._messages.state(step, self._gains, elapsed)
         self._state.publish(state)
+        if step.result is None:
+            self._controller.rest()
         if step.status != self._status:
             self._status = step.status
             # On lines of their own: rclpy ties one severity to each line that logs.
@@ -140,7 +164,7 @@ class ScpControllerNode(Node):
         step.joint_states_age = self._joint_states.age(now)
         step.head_age = self._head.age(now)
         step.reference_age = self._reference.age(now)
-        problems = []
+        problems: list[Problem] = []
         w_dot = phi_dot = np.zeros(0)
         if problem := self._head.problem(now):
             problems.append(problem)
@@ -152,6 +176,7 @@ class ScpControllerNode(Node):
             problems.append(problem)
         else:
             step.phi, phi_dot = self._joint_states.value
+        others = list(problems)
         if problem := self._reference.problem(now):
             problems.append(problem)
         else:
@@ -160,24 +185,64 @@ class ScpControllerNode(Node):
             step.w_d = np.concatenate([reference.w_d[:3], self._rpy_d])
             step.w_d_dot = reference.w_d_dot
 
+        bus = self._heed_bus(referenced=len(problems) == len(others))
         if not self._enabled:
             step.status = ControllerState.STATUS_DISABLED
             step.text = f"disabled by ~/{topics.ENABLE.name[2:]}"
+            step.reasons = (ControllerState.REASON_DISABLED,)
+        elif bus is not None:
+            step.status, step.text = bus
+            step.reasons = (ControllerState.REASON_BUS,)
         elif problems:
             step.status = _STATUS_OF_FAULT[max(problem.fault for problem in problems)]
             step.text = "; ".join(problem.text for problem in problems)
+            faults = sorted({problem.fault for problem in problems}, reverse=True)
+            step.reasons = tuple(_REASON_OF_FAULT[fault] for fault in faults)
+            # Nothing but the reference is missing: it may begin.
+            step.reference_scale = 0.0 if others else 1.0
         elif text := too_far(
             step, self._own.max_position_error_m, self._own.max_rotation_error_rad
         ):
             step.status = ControllerState.STATUS_ERROR_TOO_LARGE
             step.text = text
+            step.reasons = (ControllerState.REASON_ERROR_TOO_LARGE,)
         else:
             self._control(step, np.concatenate([w_dot, phi_dot]))
         return step
 
+    def _heed_bus(self, referenced: bool) -> tuple[int, str] | None:
+        """Return status and text if the bus driver does not do what it is told.
+
+        After it was stopped the joints rest until the reference has ceased: who went on asking for
+        motion all the time must not get it all at once. A driver that was never heard may be
+        somebody else's.
+
+        Args:
+            referenced: whether there is a reference.
+        """
+        if self._bus is None:
+            return None
+        heard_ns, state = self._bus
+        if self._steady.now().nanoseconds - heard_ns > _BUS_SILENT_NS:
+            return None
+        if state.state in (*_TAKES, BusState.STATE_HOLDING):
+            if self._stopped and referenced:
+                return (
+                    ControllerState.STATUS_STOPPED,
+                    f"was stopped ({self._stopped}): stop the reference and start it again",
+                )
+            self._stopped = ""
+            if state.state in _TAKES or not referenced:
+                return None
+            # It wants a zero command first, which every step sends that does not track.
+            return ControllerState.STATUS_WAITING, f"bus_driver: {state.text}"
+        self._stopped = f"bus_driver: {state.text}"
+        return ControllerState.STATUS_STOPPED, self._stopped
+
     def _control(self, step: Step, q_dot: NDArray[np.float64]) -> None:
         q = np.concatenate([step.w, step.phi])
-        reference = Reference(step.w_d, step.w_d_dot)
+        given = self._reference.value
+        reference = Reference(step.w_d, step.w_d_dot, time_scale=given.time_scale)
         t = (self._steady.now().nanoseconds - self._origin_ns) * 1e-9
         try:
             result = self._controller.step(q, q_dot, reference, t)
@@ -192,6 +257,7 @@ class ScpControllerNode(Node):
             ]
             step.status = ControllerState.STATUS_FAULT
             step.text = f"the control law gave no finite velocity for {', '.join(bad)}"
+            step.reasons = (ControllerState.REASON_NO_ANSWER,)
             return
         judge(step, result, self._robot)
 
@@ -225,6 +291,13 @@ def _give_up(step: Step, error: Exception) -> None:
     step.result = None
     step.status = ControllerState.STATUS_FAULT
     step.text = f"the control law has no answer: {error}"
+    step.reasons = (ControllerState.REASON_NO_ANSWER,)
+    step.reference_scale = 0.0
+
+
+def _supervisor(config: Config) -> Supervisor:
+    period_s = 1.0 / config.scp_controller.rate_hz
+    return Supervisor(config.robot, config.controller, config.supervisor, period_s)
 
 
 def main() -> int:

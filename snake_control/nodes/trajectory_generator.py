@@ -5,12 +5,17 @@ Nothing is sent before ``~/start`` (or the parameter ``autostart``) or ``cmd_vel
 reports a stale reference and commands zero. ``cmd_vel`` takes over from whatever is being followed,
 unless it is zero: a joystick at rest starts and takes over nothing.
 
+``controller_state`` says how fast the reference may go on (``reference_scale``): near a limit of
+the robot it slows down, and it waits while the controller does not follow. Where no controller is
+heard it goes on by itself.
+
 Motion follows a steady clock, also under ``use_sim_time``; ROS time only stamps the messages. So a
 clock that is set moves nothing.
 """
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from geometry_msgs.msg import PoseStamped, TwistStamped
@@ -19,6 +24,7 @@ from numpy import float64
 from numpy.typing import NDArray
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
+from snake_interfaces.msg import ControllerState
 from std_srvs.srv import Trigger
 
 from snake_control.nodes import topics
@@ -38,6 +44,7 @@ from snake_control.trajectory.sequence import Outcome, ReferenceSequence
 
 # How the planned path of a line is drawn.
 _PATH_POINTS = 61
+_CONTROLLER_SILENT_S = 0.5
 _ENDLESS_PATH_S = 60.0
 
 
@@ -53,6 +60,7 @@ class TrajectoryGenerator(Node):
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._origin_ns = self._steady.now().nanoseconds
         self._cmd_vel_stamp_ns = 0
+        self._scale, self._scale_heard_s = 1.0, -math.inf
         self._has_path = False
         self._head = Input(
             topics.HEAD_ODOMETRY.name,
@@ -66,11 +74,17 @@ class TrajectoryGenerator(Node):
         self._path = self.create_publisher(t.type, t.name, t.qos)
         t = topics.HEAD_ODOMETRY
         self.create_subscription(t.type, t.name, self._head.receive, t.newest_only)
+        t = topics.CONTROLLER_STATE
+        self.create_subscription(t.type, t.name, self._on_controller_state, t.newest_only)
         t = topics.CMD_VEL
         self.create_subscription(t.type, t.name, self._on_cmd_vel, t.qos)
         self.create_service(topics.START.type, topics.START.name, self._on_start)
         self.create_service(topics.STOP.type, topics.STOP.name, self._on_stop)
         self.create_timer(1.0 / config.rate_hz, self._step, clock=self._steady)
+
+    def _on_controller_state(self, message: ControllerState) -> None:
+        if 0.0 <= message.reference_scale <= 1.0:
+            self._scale, self._scale_heard_s = message.reference_scale, self._steady_s()
 
     def _now(self) -> int:
         return self.get_clock().now().nanoseconds
@@ -86,6 +100,8 @@ class TrajectoryGenerator(Node):
         now = self._now()
         if self._autostart and self._head_pose(now) is not None:
             self._start(now)
+        heard = self._steady_s() - self._scale_heard_s <= _CONTROLLER_SILENT_S
+        self._sequence.time_scale = self._scale if heard else 1.0
         reference = self._sequence.sample(self._steady_s())
         if reference is not None:
             self._reference.publish(reference_message(reference, now, self._config.frame_id))

@@ -38,6 +38,10 @@ class ReferenceSequence:
     ``now`` is the time of a steady clock [s], in rising order. The motion's own time follows it
     from sample to sample, but by no more than two sample periods at once: after a stall the
     reference goes on from where it was, and does not make up for the time lost.
+
+    Attributes:
+        time_scale: how fast the motion's own time goes, 0..1, but for coming to rest, which takes
+            no longer than it must. Whoever follows the reference decides it.
     """
 
     def __init__(self, config: TrajectoryGeneratorConfig) -> None:
@@ -54,6 +58,7 @@ class ReferenceSequence:
         self._sampled_at: float | None = None
         self._trajectory: HeadTrajectory | None = None
         self._command_ends = 0.0
+        self.time_scale = 1.0
 
     @property
     def idle(self) -> bool:
@@ -74,7 +79,13 @@ class ReferenceSequence:
         """Return the motion's own time at ``now`` [s]."""
         if self._sampled_at is None:
             return self._t
-        return self._t + min(max(now - self._sampled_at, 0.0), self._longest_step)
+        elapsed = min(max(now - self._sampled_at, 0.0), self._longest_step)
+        return self._t + self._scale * elapsed
+
+    @property
+    def _scale(self) -> float:
+        braking = isinstance(self._trajectory, Teleop) and not self.commanded
+        return 1.0 if braking else self.time_scale
 
     def start(self, now: float, head: Array | None) -> Outcome:
         """Follow the configured trajectory from now on.
@@ -133,7 +144,7 @@ class ReferenceSequence:
         teleop = self._trajectory if isinstance(self._trajectory, Teleop) else None
         if teleop is not None and now > self._command_ends:
             teleop.release()
-        reference = self._trajectory.sample(self._t)
+        reference = dataclasses.replace(self._trajectory.sample(self._t), time_scale=self._scale)
         if teleop is not None and teleop.at_rest:
             self._trajectory = None
         return reference

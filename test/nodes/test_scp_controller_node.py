@@ -5,7 +5,7 @@ import os
 
 import numpy as np
 import pytest
-from snake_interfaces.msg import ControllerState
+from snake_interfaces.msg import BusState, ControllerState
 from std_srvs.srv import SetBool
 
 from snake_control.control.reference import Reference
@@ -46,7 +46,8 @@ def is_zero(command):
 
 
 def test_commands_what_the_control_law_says(rig):
-    state = rig.wait_status(*GOOD, what="tracking")
+    # The acceleration limit has done its part by then.
+    state = rig.wait_status(ControllerState.STATUS_TRACKING, what="tracking")
     command = rig.command_of(state)
     expected = ScpController(rig.config.robot, rig.config.controller).step(
         np.concatenate([rig.w, rig.phi]), None, rig.table_1, 0.0
@@ -212,8 +213,9 @@ def test_a_straight_robot_is_said_to_be_singular_and_moves_within_its_limits(rig
         rig.reference = reference_message(at_the_head, 0, "world")
         state = rig.wait_status(
             ControllerState.STATUS_LIMITED,
+            ControllerState.STATUS_HOLDING,
             what="the singular posture",
-            texts=["singular", "B_tilde"],
+            texts=["singular head posture", "singular shape of the body (parallel"],
         )
     finally:
         rig.w, rig.phi = w, phi
@@ -366,10 +368,64 @@ def test_speed_limit_is_named():
         assert np.abs(command.velocity).max() == pytest.approx(0.05)
         assert len(state.speed_limited) == 1
         assert state.speed_limited[0] in state.text
-        assert 0 < state.speed_scale < 1
-        np.testing.assert_allclose(
-            state.u, np.array(state.u_unlimited) * state.speed_scale, rtol=1e-9
+        assert state.speed_scale < 1
+        assert state.feedback_scale < 1
+        assert ControllerState.REASON_JOINT_SPEED in state.reasons
+
+
+class Driver:
+    """Says at 50 Hz what a bus driver does."""
+
+    def __init__(self, graph: Graph) -> None:
+        self._publisher = graph.publisher(topics.BUS_STATE)
+        self.state, self.text = BusState.STATE_HOLDING, "holding: waiting for a zero command"
+        graph.every(0.02, self._publish)
+
+    def _publish(self) -> None:
+        self._publisher.publish(BusState(state=self.state, text=self.text))
+
+
+def test_it_heeds_what_the_bus_driver_does():
+    with Graph() as graph:
+        rig, driver = ControllerRig(graph), Driver(graph)
+        graph.start(NODE, params_files=[PAPER_ROBOT])
+        graph.wait_for(lambda: rig.commands.last, 30.0, "a command")
+        state = rig.wait_status(
+            ControllerState.STATUS_WAITING,
+            what="a driver that wants a zero command",
+            texts=["bus_driver: holding: waiting for a zero command"],
         )
+        assert list(state.reasons) == [ControllerState.REASON_BUS]
+        assert state.reference_scale == 0.0, "the reference has to wait"
+        assert is_zero(rig.command_of(state))
+        driver.state, driver.text = BusState.STATE_MOVING, "moving"
+        assert rig.wait_status(*GOOD, what="tracking").reference_scale == 1.0
+        driver.state, driver.text = BusState.STATE_STOPPED, "joint_3 shut down; needs ~/recover"
+        state = rig.wait_status(
+            ControllerState.STATUS_STOPPED, what="the driver's stop", texts=["joint_3 shut down"]
+        )
+        assert is_zero(rig.command_of(state))
+        # Recovered; the reference goes on all the time.
+        driver.state, driver.text = BusState.STATE_MOVING, "moving"
+        rig.wait_status(
+            ControllerState.STATUS_STOPPED,
+            what="a reference that has to be started again",
+            texts=["was stopped (bus_driver: joint_3 shut down", "start it again"],
+        )
+        rig.reference = None
+        state = rig.wait_status(ControllerState.STATUS_STALE, what="the end of the reference")
+        assert state.reference_scale == 1.0, "a reference may begin"
+        rig.repair()
+        rig.wait_status(*GOOD, what="tracking again")
+
+
+def test_a_reference_whose_time_scale_is_none_is_named(rig):
+    rig.reference.time_scale = 1.5
+    rig.wait_status(
+        ControllerState.STATUS_INVALID, what="the time scale", texts=["time_scale is 1.5"]
+    )
+    rig.repair()
+    rig.wait_status(*GOOD, what="tracking after the repair")
 
 
 def test_commands_go_on_when_the_clock_is_set_back_and_stands():

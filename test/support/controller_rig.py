@@ -17,7 +17,11 @@ from snake_control.nodes import topics
 from snake_control.nodes.conversions import header, pose_message, reference_message, stamp_ns
 from support.graph import CONFIG, Graph
 
-GOOD = (ControllerState.STATUS_TRACKING, ControllerState.STATUS_LIMITED)
+GOOD = (
+    ControllerState.STATUS_TRACKING,
+    ControllerState.STATUS_LIMITED,
+    ControllerState.STATUS_RECOVERING,
+)
 
 
 class ControllerRig:

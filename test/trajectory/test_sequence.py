@@ -192,3 +192,29 @@ def test_a_joystick_at_rest_does_not_keep_a_stopped_reference_alive():
         sequence.command(ZERO, 1.0 + k * DT, HEAD)
         sequence.sample(1.0 + k * DT)
     assert sequence.idle
+
+
+def test_the_motions_own_time_goes_as_fast_as_it_may():
+    sequence = make()
+    assert sequence.start(0.0, None).done
+    before = sequence.sample(0.02)
+    assert before is not None
+    assert before.time_scale == 1.0
+    for k in range(2, 52):
+        sequence.time_scale = 0.25
+        slowed = sequence.sample(0.02 * k)
+    assert slowed is not None
+    assert slowed.time_scale == 0.25
+    np.testing.assert_array_equal(slowed.w_d_dot, before.w_d_dot)
+    np.testing.assert_allclose(slowed.w_d - before.w_d, 0.25 * before.w_d_dot, atol=1e-12)
+    sequence.time_scale = 0.0
+    still = sequence.sample(1.04)
+    again = sequence.sample(1.06)
+    assert still is not None
+    assert again is not None
+    np.testing.assert_array_equal(still.w_d, again.w_d)
+    # Coming to rest takes no longer than it must.
+    sequence.stop(1.06)
+    braking = sequence.sample(1.08)
+    assert braking is not None
+    assert braking.time_scale == 1.0

@@ -54,6 +54,11 @@ class Composition:
         self._head, self._base = head.made(robot, c), base.made(robot, c)
         self._projection = c.scp_law == "projection"
 
+    @property
+    def follows_head(self) -> bool:
+        """Whether the SCPs' velocities depend on the head's: not those of (25), (27)."""
+        return self._projection
+
     def velocities(self, posture: Posture, w_dot: ArrayLike) -> Array:
         """Return the wanted SCP velocities, H-SCPs first, (m,) [rad/s].
 

@@ -1,0 +1,244 @@
+"""Keeps the robot under the law (22) away from its limits, and says what it did and why.
+
+In this order, each only as far as the one before does not suffice:
+
+1. the SCPs work to get away from a limit that is near, and the sub-tasks fade (``escape``);
+2. the reference is slowed: its rate, not the correction of the error, so that the head stays on
+   its path (whoever sends the reference reads ``reference_scale`` and slows down with it);
+3. the correction of the error is slowed, then the motion of the SCPs: at last the robot holds.
+
+No step depends on how the robot came where it is, but for the acceleration limit: a reference that
+leads away from a limit is followed at once.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from snake_control.config import ControllerConfig, RobotConfig, SupervisorConfig
+from snake_control.control.barriers import Barriers, BarriersAt, Bound, Limit
+from snake_control.control.escape import Escape
+from snake_control.control.reference import Reference
+from snake_control.control.scp_controller import ControlResult, ScpController
+from snake_control.model.posture import Posture
+
+Array = NDArray[np.float64]
+
+HOLDING_BELOW = 0.05
+"""Share of the wanted motion of the head below which the robot counts as holding."""
+HOLDING_AFTER_S = 0.5
+
+SUB_TASK_SHARE = 0.5
+"""Share of the joints' speed limits that the sub-tasks may use with the head at rest."""
+
+_CALMEST = 0.01
+_PLAIN = dataclasses.fields(ControlResult)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class SupervisedResult(ControlResult):
+    """A control step and what the supervisor made of it.
+
+    Attributes:
+        reference_scale: how fast the reference may go on, 0..1.
+        feedback_scale: share of the correction of the error, 0..1.
+        scp_scale: share of the motion of the SCPs, 0..1.
+        bound: the limit that slowed the motion; ``None`` if nothing did.
+        escaping: limits that the SCPs work to get away from, with the danger 0..1.
+        accelerating: whether the acceleration limit bit.
+        holding: whether the head has been kept at rest for a while though it should move.
+    """
+
+    reference_scale: float = 1.0
+    feedback_scale: float = 1.0
+    scp_scale: float = 1.0
+    bound: Bound | None = None
+    escaping: dict[Limit, float] = dataclasses.field(default_factory=dict)
+    accelerating: bool = False
+    holding: bool = False
+
+
+@dataclasses.dataclass(frozen=True)
+class _Scaled:
+    u: Array
+    reference: float
+    feedback: float
+    scps: float
+    bound: Bound | None
+
+
+class Supervisor:
+    """``ScpController`` within limits.
+
+    It remembers the last command (for the acceleration limit) and since when the robot holds.
+    """
+
+    def __init__(
+        self,
+        robot: RobotConfig,
+        controller: ControllerConfig,
+        supervisor: SupervisorConfig,
+        period_s: float,
+    ) -> None:
+        """Prepare for a robot.
+
+        Args:
+            robot, controller, supervisor: the configuration.
+            period_s: time between two steps [s].
+
+        Raises:
+            ConfigError: a sub-task cannot be made.
+        """
+        self._law = ScpController(robot, controller)
+        self._config = supervisor
+        self._period_s = period_s
+        self._barriers = Barriers(robot, supervisor)
+        self._escape = Escape(robot, supervisor, self._barriers)
+        self._at_rest = np.zeros(robot.joints)
+        self._sub_task_speeds = SUB_TASK_SHARE * np.array(robot.joint_speed_limits_rad_s)
+        self._still = [0.0] * len(robot.controlled)
+        self.rest()
+
+    def rest(self) -> None:
+        """Note that the joints are commanded to rest: the next motion begins there."""
+        self._u = self._at_rest
+        self._reference_scale = 1.0
+        self._held_since: float | None = None
+        self._bound: Bound | None = None
+        self._sub_task_motion = self._at_rest
+        self._calm = 1.0
+        self._dangers: dict[Limit, float] = {}
+
+    def step(
+        self, q: ArrayLike, q_dot: ArrayLike | None, reference: Reference, t: float
+    ) -> SupervisedResult:
+        """Return joint velocities for one moment.
+
+        Args:
+            q: [w, phi], (n+5,) [m, rad].
+            q_dot: its rate; not used.
+            reference: wanted head pose and rate, at ``reference.time_scale`` of its speed.
+            t: time of a steady clock [s].
+
+        Raises:
+            ModelError: q has the wrong shape or is not finite.
+        """
+        if not self._config.enabled:
+            plain = self._law.step(q, q_dot, reference, t)
+            self._u = plain.u
+            return SupervisedResult(**{f.name: getattr(plain, f.name) for f in _PLAIN})
+        posture, error = self._law.look(q, reference)
+        phi = posture.g.q[6:]
+        at = self._barriers.at(phi)
+        self._dangers = dangers = self._escape.dangers(at, phi, self._dangers)
+        fade = 1.0 - max(dangers.values(), default=0.0)
+        away = self._escape.velocities(posture, dangers) if dangers else 0.0
+
+        back = self._law.feedback(error)
+        forward = self._law.feedforward(reference)
+
+        resting_scps = self._law.sub_tasks(posture, self._still)
+        share = fade * self._sub_task_share(posture, resting_scps)
+
+        def motion(w_dot: list[float]) -> tuple[Array, Array]:
+            scps = share * resting_scps + away
+            if self._law.scps_follow_head:
+                scps = scps + self._law.sub_tasks(posture, w_dot) - resting_scps
+            return scps, posture.k.joint_velocities(w_dot, scps.tolist())
+
+        scale = reference.time_scale
+        full = [scale * f + b for f, b in zip(forward, back, strict=True)]
+        phi_tilde_dot_d, wanted = motion(full)
+        scaled = self._scaled(at, wanted, full, back, scale, motion)
+        u, accelerating = self._accelerated(at, scaled.u)
+        self._u = u
+        self._let_reference_go(scaled.reference)
+        # What the head was given of what it should do.
+        given = scaled.reference / scale if scale > 0.0 and any(forward) else scaled.feedback
+        share = self._reference_scale if any(forward) else scaled.feedback
+        holding = self._holds(share, bool(any(forward) or any(back)), t)
+        self._bound = scaled.bound or (self._bound if holding else None)
+        return SupervisedResult(
+            posture=posture,
+            w_d=reference.w_d,
+            w_d_dot=reference.w_d_dot,
+            error=np.array(error),
+            phi_tilde_dot_d=phi_tilde_dot_d,
+            u_unlimited=wanted,
+            u=u,
+            speed_scale=min(1.0, given),
+            speed_limited=_joints(self._bound, Limit.JOINT_SPEED),
+            range_limited=_joints(self._bound, Limit.JOINT_RANGE),
+            reference_scale=self._reference_scale,
+            feedback_scale=scaled.feedback,
+            scp_scale=scaled.scps,
+            bound=self._bound,
+            escaping=dangers,
+            accelerating=accelerating,
+            holding=holding,
+        )
+
+    def _sub_task_share(self, posture: Posture, scps: Array) -> float:
+        """Return the share of the sub-tasks' own motion that leaves the head its joint speeds.
+
+        A gradient can ask for any speed; along the body it grows by orders of magnitude. Steps
+        against the one before are too long for the gradient that they follow: the share is halved
+        as long as they come, and grows again after them.
+        """
+        motion = posture.k.joint_velocities(self._still, scps.tolist())
+        turned = float(motion.dot(self._sub_task_motion)) < 0.0
+        self._calm = max(0.5 * self._calm, _CALMEST) if turned else min(1.1 * self._calm, 1.0)
+        self._sub_task_motion = motion
+        excess = float((np.abs(motion) / self._sub_task_speeds).max(initial=0.0))
+        return self._calm / max(excess, 1.0)
+
+    def _scaled(self, at, wanted, full, back, scale, motion) -> _Scaled:  # type: ignore[no-untyped-def]
+        """Return the largest allowed part of a motion."""
+        if at.allows(wanted):
+            return _Scaled(wanted, 1.0, 1.0, 1.0, None)
+        _, resting = motion(self._still)
+        _, correcting = motion(back)
+        share, bound = at.largest_share(correcting, wanted - correcting)
+        if share >= 0.0:
+            u = correcting + share * (wanted - correcting)
+            return _Scaled(u, share * scale, 1.0, 1.0, bound)
+        share, bound = at.largest_share(resting, correcting - resting)
+        if share >= 0.0:
+            return _Scaled(resting + share * (correcting - resting), 0.0, share, 1.0, bound)
+        share, bound = at.largest_share(self._at_rest, resting)
+        share = max(share, 0.0)
+        return _Scaled(share * resting, 0.0, 0.0, share, bound)
+
+    def _accelerated(self, at: BarriersAt, u: Array) -> tuple[Array, bool]:
+        """Return the command nearest to ``u`` that the acceleration limit allows.
+
+        All joints change by the same share, so that the wheels go on rolling.
+        """
+        limit = self._config.acceleration_limit_rad_s2 * self._period_s
+        change = u - self._u
+        largest = float(np.abs(change).max(initial=0.0))
+        if limit == 0.0 or largest <= limit:
+            return u, False
+        slower = self._u + (limit / largest) * change
+        # To keep away from a limit a joint may brake as hard as it can.
+        return (slower, True) if at.allows(slower) else (u, False)
+
+    def _let_reference_go(self, allowed: float) -> None:
+        rise = self._config.scale_rise_per_s * self._period_s
+        self._reference_scale = min(allowed, self._reference_scale + rise)
+
+    def _holds(self, share: float, asked: bool, t: float) -> bool:
+        """Return whether the head has been given next to nothing of its motion for a while."""
+        if not asked or share > HOLDING_BELOW:
+            self._held_since = None
+            return False
+        if self._held_since is None:
+            self._held_since = t
+        return t - self._held_since >= HOLDING_AFTER_S
+
+
+def _joints(bound: Bound | None, limit: Limit) -> tuple[int, ...]:
+    return bound.joints if bound is not None and bound.limit is limit else ()

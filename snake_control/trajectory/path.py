@@ -1,0 +1,177 @@
+"""Curves that the head can follow, by their length, and motion along them from rest to rest."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.special import ellipj, ellipk
+
+from snake_control.control.reference import Reference
+
+Array = NDArray[np.float64]
+
+
+class PathPoint(NamedTuple):
+    """Where a curve is, and how it goes on.
+
+    Attributes:
+        w: [x, y, z, R, P, Y], (6,) [m, rad].
+        by_s, by_s2: first and second derivative by the length, (6,) [1, rad/m, 1/m, rad/m^2].
+    """
+
+    w: Array
+    by_s: Array
+    by_s2: Array
+
+
+class Path(Protocol):
+    """A curve in space with an attitude at each of its points.
+
+    Attributes:
+        length: of the curve on the floor plan [m].
+    """
+
+    length: float
+
+    def at(self, s: float) -> PathPoint:
+        """Return the point after the length ``s`` [m], 0 .. ``length``."""
+
+
+class Circle:
+    """A horizontal circle through the start, ahead of the head; the head turns with it."""
+
+    def __init__(self, start_pose: ArrayLike, radius: float, turns: float = 1.0) -> None:
+        """Define the circle.
+
+        Args:
+            start_pose: [x, y, z, R, P, Y], (6,) [m, rad]; the circle leaves it along its yaw.
+            radius: not 0; positive turns left [m].
+            turns: how often round, > 0.
+        """
+        self._start = np.array(start_pose, dtype=float)
+        self._radius = radius
+        self.length = math.tau * abs(radius) * turns
+
+    def at(self, s: float) -> PathPoint:
+        """Return the point after the length ``s`` [m]."""
+        turn = 1.0 / self._radius
+        first, now = self._start[5], self._start[5] + turn * s
+        w = self._start.copy()
+        w[0] += self._radius * (math.sin(now) - math.sin(first))
+        w[1] -= self._radius * (math.cos(now) - math.cos(first))
+        w[5] = now
+        c, t = math.cos(now), math.sin(now)
+        return PathPoint(
+            w,
+            np.array([c, t, 0.0, 0.0, 0.0, turn]),
+            np.array([-turn * t, turn * c, 0.0, 0.0, 0.0, 0.0]),
+        )
+
+
+class FigureEight:
+    """A horizontal eight: Bernoulli's lemniscate, from its crossing; the head turns with it.
+
+    With s/a = t the curve is at distance a sl(t) from the crossing, in the direction of
+    -arctan cl(t) from its axis, and its curvature is 3 sl(t) / a (lemniscate sine and cosine), so
+    that the sharpest radius, at the far ends, is a / 3.
+    """
+
+    def __init__(self, start_pose: ArrayLike, radius: float, rounds: float = 1.0) -> None:
+        """Define the eight.
+
+        Args:
+            start_pose: the crossing, [x, y, z, R, P, Y], (6,) [m, rad]; the curve leaves it along
+                its yaw.
+            radius: smallest radius of the curve, not 0; positive turns left first [m].
+            rounds: how often round, > 0; a half is one loop.
+        """
+        self._start = np.array(start_pose, dtype=float)
+        self._side = math.copysign(1.0, radius)
+        self._a = 3.0 * abs(radius)
+        self.length = 4.0 * _QUARTER * self._a * rounds
+
+    def at(self, s: float) -> PathPoint:
+        """Return the point after the length ``s`` [m]."""
+        a, side = self._a, self._side
+        sn, cn, dn, _ = map(float, ellipj(math.sqrt(2.0) * s / a, 0.5))
+        sl = sn / (math.sqrt(2.0) * dn)
+        # From the axis of the eight, which lies 45 degrees to the side of the start.
+        direction = -math.atan(cn)
+        turned = 3.0 * (direction + math.pi / 4)
+        axis = self._start[5] + side * math.pi / 4
+        now = self._start[5] + side * turned
+        w = self._start.copy()
+        w[0] += a * sl * math.cos(axis + side * direction)
+        w[1] += a * sl * math.sin(axis + side * direction)
+        w[5] = now
+        c, t = math.cos(now), math.sin(now)
+        curvature = 3.0 * side * sl / a
+        # d sl = cl (1 + sl^2) dt.
+        change = 3.0 * side * cn * (1.0 + sl * sl) / a**2
+        return PathPoint(
+            w,
+            np.array([c, t, 0.0, 0.0, 0.0, curvature]),
+            np.array([-curvature * t, curvature * c, 0.0, 0.0, 0.0, change]),
+        )
+
+
+_QUARTER = float(ellipk(0.5)) / math.sqrt(2.0)
+"""Length of a quarter of the lemniscate with a = 1: half of the lemniscate constant, 1.3110."""
+
+
+class Along:
+    """Follows a path: speeds up evenly, keeps a speed, slows down evenly, and holds the end.
+
+    The acceleration itself grows and shrinks as sin^2, so the motion is smooth up to it.
+    """
+
+    def __init__(self, path: Path, speed: float, acceleration: float, start: float = 0.0) -> None:
+        """Define the motion.
+
+        Args:
+            path: the curve.
+            speed: along it, > 0 [m/s]; not reached on a path that is too short.
+            acceleration: largest acceleration along it, > 0 [m/s^2].
+            start: time at which it starts [s]; before it the start is held.
+        """
+        self._path = path
+        self._start = start
+        # A ramp of the form sin^2 takes twice as long as one of constant acceleration.
+        self._ramp = 2.0 * speed / acceleration
+        if speed * self._ramp > path.length:
+            self._ramp = math.sqrt(2.0 * path.length / acceleration)
+            speed = path.length / self._ramp
+        self._speed = speed
+        self.duration = path.length / speed + self._ramp
+
+    def sample(self, t: float) -> Reference:
+        """Return pose, rate and acceleration at time ``t`` [s]."""
+        s, rate, acceleration = self._progress(t - self._start)
+        point = self._path.at(s)
+        return Reference(
+            point.w, rate * point.by_s, acceleration * point.by_s + rate**2 * point.by_s2
+        )
+
+    def _progress(self, t: float) -> tuple[float, float, float]:
+        if t >= self.duration:
+            return self._path.length, 0.0, 0.0
+        if t > self.duration - self._ramp:
+            s, rate, acceleration = self._ramped(self.duration - t)
+            return self._path.length - s, rate, -acceleration
+        return self._ramped(max(t, 0.0))
+
+    def _ramped(self, t: float) -> tuple[float, float, float]:
+        """Return length, speed and acceleration from rest, after ``t`` [s]."""
+        ramp, speed = self._ramp, self._speed
+        if t >= ramp:
+            return speed * (t - 0.5 * ramp), speed, 0.0
+        k = math.tau / ramp
+        # The integrals of (2 speed / ramp) sin^2(k t / 2).
+        return (
+            speed / ramp * (0.5 * t * t - (1.0 - math.cos(k * t)) / k**2),
+            speed / ramp * (t - math.sin(k * t) / k),
+            speed / ramp * (1.0 - math.cos(k * t)),
+        )

@@ -1,0 +1,206 @@
+"""The supervisor: (22) where nothing is near, and what it does where something is."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from snake_control.config import Config, SupervisorConfig
+from snake_control.control.barriers import Limit
+from snake_control.control.reference import Reference
+from snake_control.control.scp_controller import ScpController
+from snake_control.control.supervisor import HOLDING_AFTER_S, HOLDING_BELOW, Supervisor
+from snake_control.experiment.cases import load_case
+from snake_control.experiment.guided import GuidedRobot
+from snake_control.model.floor import head_pose_on_floor
+from snake_control.trajectory.approach import Approach
+from snake_control.trajectory.hold import Hold
+from snake_control.trajectory.line import Line
+
+DT = 0.02
+
+
+def supervisor(config: Config, **changes: object) -> Supervisor:
+    own = dataclasses.replace(config.supervisor, **changes)  # type: ignore[arg-type]
+    return Supervisor(config.robot, config.controller, own, DT)
+
+
+@pytest.fixture(scope="module")
+def config() -> Config:
+    return load_case((), 3)
+
+
+@pytest.fixture(scope="module")
+def start(config: Config) -> np.ndarray:
+    phi = np.array(config.robot.start_joint_angles_rad)
+    return np.concatenate((head_pose_on_floor(config.robot, phi, np.zeros(3)), phi))
+
+
+@pytest.fixture(scope="module")
+def table_1(config: Config) -> Reference:
+    own = config.trajectory_generator
+    return Reference(np.array(own.start_pose), np.array(own.velocity))
+
+
+def settled(config: Config, made: Supervisor, q: np.ndarray, reference: Reference):
+    """The answer once the acceleration limit has nothing to do any more."""
+    for k in range(20):
+        result = made.step(q, None, reference, DT * k)
+    assert not result.accelerating
+    return result
+
+
+def test_far_from_all_limits_it_is_the_law_to_the_last_digit(
+    config: Config, start: np.ndarray, table_1: Reference
+) -> None:
+    law = ScpController(config.robot, config.controller).step(start, None, table_1, 0.0)
+    result = settled(config, supervisor(config), start, table_1)
+    np.testing.assert_array_equal(result.u, law.u)
+    np.testing.assert_array_equal(result.phi_tilde_dot_d, law.phi_tilde_dot_d)
+    assert (result.reference_scale, result.feedback_scale, result.scp_scale) == (1.0, 1.0, 1.0)
+    assert result.bound is None
+    assert result.escaping == {}
+    assert not result.holding
+
+
+def test_switched_off_it_is_the_law_whatever_is_near(
+    config: Config, start: np.ndarray, table_1: Reference
+) -> None:
+    far = Reference(table_1.w_d + [0.2, 0, 0.1, 0, 0, 0], 50 * table_1.w_d_dot)
+    law = ScpController(config.robot, config.controller).step(start, None, far, 0.0)
+    result = supervisor(config, enabled=False).step(start, None, far, 0.0)
+    np.testing.assert_array_equal(result.u, law.u)
+    assert (result.speed_scale, result.speed_limited) == (law.speed_scale, law.speed_limited)
+
+
+def test_the_reference_is_slowed_before_the_correction_of_the_error(
+    config: Config, start: np.ndarray, table_1: Reference
+) -> None:
+    quick = Reference(table_1.w_d, 60 * table_1.w_d_dot)
+    result = settled(config, supervisor(config, d_min_warn_m=0.0, d_min_stop_m=0.0), start, quick)
+    assert result.bound is not None
+    assert 0.0 < result.reference_scale < 1.0
+    assert (result.feedback_scale, result.scp_scale) == (1.0, 1.0)
+    # All of the correction, and as much of the reference's rate.
+    law = ScpController(config.robot, config.controller)
+    posture, error = law.look(start, quick)
+    scps = law.sub_tasks(posture, [0.0] * 6)
+    w_dot = np.array(law.feedback(error)) + result.speed_scale * quick.w_d_dot
+    expected = posture.k.joint_velocities(w_dot.tolist(), scps.tolist())
+    np.testing.assert_allclose(result.u, expected, rtol=1e-6, atol=1e-9)
+
+
+def test_the_reference_speeds_up_again_slowly(
+    config: Config, start: np.ndarray, table_1: Reference
+) -> None:
+    made = supervisor(config, scale_rise_per_s=0.5)
+    quick = Reference(table_1.w_d, 60 * table_1.w_d_dot)
+    slowed = settled(config, made, start, quick).reference_scale
+    scales = [made.step(start, None, table_1, 1.0 + DT * k).reference_scale for k in range(15)]
+    np.testing.assert_allclose(np.diff(scales), 0.5 * DT, atol=1e-12)
+    assert scales[0] == pytest.approx(slowed + 0.5 * DT)
+
+
+def test_speeds_change_no_faster_than_allowed_and_the_wheels_go_on_rolling(
+    config: Config, start: np.ndarray, table_1: Reference
+) -> None:
+    made = supervisor(config, acceleration_limit_rad_s2=5.0)
+    before = np.zeros(11)
+    final = settled(config, supervisor(config), start, table_1).u
+    for k in range(30):
+        result = made.step(start, None, table_1, DT * k)
+        assert np.abs(result.u - before).max() <= 5.0 * DT + 1e-12
+        if result.accelerating:
+            # The same posture: a share of the final motion.
+            share = result.u[5] / final[5]
+            np.testing.assert_allclose(result.u, share * final, atol=1e-9)
+        before = result.u
+    np.testing.assert_allclose(before, final, atol=1e-9)
+    made.rest()
+    assert made.step(start, None, table_1, 1.0).accelerating
+
+
+def test_near_falling_the_scps_regain_the_margin_while_the_head_goes_on(config: Config) -> None:
+    robot = GuidedRobot(config)
+    own = config.trajectory_generator
+    line = Line(np.array(own.start_pose), own.velocity, 0.0)
+    seen = list(robot.follow(line.sample, 8.0, 20.0))
+    results = [s.result for s in seen if s.result is not None]
+    escaping = [r for r in results if Limit.FALL in r.escaping]
+    assert escaping, "the transient of Table 1 comes near falling"
+    assert min(s.state.d_min for s in seen) > config.supervisor.d_min_stop_m - 1e-4
+    assert seen[-1].state.d_min > config.supervisor.d_min_warn_m
+    # An urgent escape fades the sub-tasks.
+    worst = max(escaping, key=lambda r: r.escaping[Limit.FALL])
+    assert worst.escaping[Limit.FALL] > 0.3
+
+
+def test_a_danger_stays_in_the_list_until_it_is_well_over(config: Config) -> None:
+    robot = GuidedRobot(config)
+    own = config.trajectory_generator
+    line = Line(np.array(own.start_pose), own.velocity, 0.0)
+    flags = [
+        Limit.FALL in s.result.escaping
+        for s in robot.follow(line.sample, 10.0, 20.0)
+        if s.result is not None
+    ]
+    changes = int(np.abs(np.diff(np.array(flags, dtype=int))).sum())
+    assert 1 <= changes <= 4
+
+
+def test_it_holds_and_says_so_and_goes_on_at_once_when_led_away(config: Config) -> None:
+    robot = GuidedRobot(config)
+    level = np.array([0.0, 0.0, 0.2, 0.39, 0.39, 0.0])
+    for _ in robot.follow(Approach(Hold(level), robot.state.w, 0.0, 10.0).sample, 14.0, 40.0):
+        pass
+    up = Line(robot.state.w, (0.0, 0.0, 0.02, 0.0, 0.0, 0.0), 0.0)
+    seen = list(robot.follow(up.sample, 20.0, 30.0))
+    results = [s.result for s in seen if s.result is not None]
+    first = next(i for i, r in enumerate(results) if r.holding)
+    needed = round(HOLDING_AFTER_S / DT)
+    scales = [r.reference_scale for r in results]
+    assert max(scales[first - needed : first + 1]) <= HOLDING_BELOW
+    assert max(scales[: first - needed]) > HOLDING_BELOW
+    last = results[-1]
+    assert last.holding
+    assert last.bound is not None
+    assert not robot.state.fallen
+    top = robot.state.w[2]
+    assert top > 0.22, "it went as far as it could"
+    down = Line(robot.state.w, (0.0, 0.0, -0.02, 0.0, 0.0, 0.0), 0.0)
+    seen = list(robot.follow(down.sample, 2.0, 4.0))
+    assert robot.state.w[2] < top - 0.02
+    assert not seen[-1].result.holding  # type: ignore[union-attr]
+
+
+def test_a_gradient_without_bounds_leaves_the_head_its_joint_speeds(config: Config) -> None:
+    wild = dataclasses.replace(config, controller=dataclasses.replace(config.controller, a_b=1e6))
+    start = GuidedRobot(wild)
+    line = Line(start.state.w, (0.01, 0, 0, 0, 0, 0), 0.0)
+    seen = list(start.follow(line.sample, 6.0, 20.0))
+    took = start.t
+    assert took < 9.0
+    error = np.abs(seen[-1].state.w - seen[-1].reference.w_d)
+    assert error[:3].max() < 0.01
+    # The sub-tasks' steps shorten instead of beating to and fro.
+    late = np.array([s.result.u for s in seen[-50:] if s.result is not None])
+    beats = (np.sign(late[1:]) * np.sign(late[:-1]) < 0) & (np.abs(late[1:]) > 0.5)
+    assert beats.mean() < 0.1
+
+
+@pytest.mark.parametrize(
+    ("given", "field"),
+    [
+        ({"d_min_warn_m": 0.001}, "supervisor.d_min_warn_m"),
+        ({"nearness_warn": 0.99}, "supervisor.nearness_warn"),
+        ({"regularity_warn": 0.01}, "supervisor.regularity_warn"),
+        ({"approach_rate_per_s": 20.0}, "supervisor.approach_rate_per_s"),
+    ],
+)
+def test_thresholds_that_contradict_each_other_are_refused(
+    given: dict[str, float], field: str
+) -> None:
+    with pytest.raises(ValueError, match=f"^{field}"):
+        SupervisorConfig(**given)

@@ -1,0 +1,44 @@
+"""A part of the campaign of head trajectories; ``make heads`` runs all of it."""
+
+from __future__ import annotations
+
+import pytest
+from heads.campaign import try_feasible, try_hostile
+
+from support.head_trajectories import HOSTILE_KINDS, feasible, hostile
+
+
+@pytest.mark.parametrize("number", [0, 1, 3, 4, 5, 9])
+def test_what_the_robot_can_do_is_accepted_and_done(number: int) -> None:
+    outcome = try_feasible(number)
+    assert outcome.accepted, outcome.refusal
+    assert outcome.completed
+    assert not outcome.fell
+    assert outcome.range_rad <= 0.0
+    assert outcome.speed_rad_s <= 1e-9
+    assert outcome.error_m < 0.003
+    assert outcome.error_rad < 0.01
+
+
+@pytest.mark.parametrize("number", range(len(HOSTILE_KINDS)), ids=HOSTILE_KINDS)
+def test_what_it_must_not_do_is_ridden_out(number: int) -> None:
+    outcome = try_hostile(number)
+    assert not outcome.fell
+    assert outcome.d_min_m > 0.0
+    assert outcome.range_rad <= 0.0
+    assert outcome.speed_rad_s <= 1e-9
+    assert outcome.completed, f"tracked again after {outcome.took:.1f} s"
+
+
+def test_the_limited_servos_ride_it_out_too() -> None:
+    outcome = try_hostile(HOSTILE_KINDS.index("jump"), "limited")
+    assert not outcome.fell
+    assert outcome.range_rad <= 0.0
+
+
+def test_trajectories_do_not_depend_on_how_many_there_are() -> None:
+    few, many = feasible(5), feasible(200)
+    assert [f.name for f in few] == [f.name for f in many[:5]]
+    assert [f.duration for f in few] == [f.duration for f in many[:5]]
+    w = few[0].start
+    assert hostile(w, 3)[2].name == hostile(w, 100)[2].name
