@@ -39,7 +39,7 @@ _SHARED_GROUPS_OF_NODE: dict[str, tuple[str, ...]] = {
     "bus_driver": ("robot", "servos"),
     "pose_input": (),
     "scp_controller": ("robot", "controller", "supervisor"),
-    "trajectory_generator": (),
+    "trajectory_generator": ("robot", "controller", "supervisor"),
     "mock_bus": ("robot", "servos"),
 }
 # Parameters that rclpy itself declares in every node.

@@ -252,6 +252,29 @@ class TrajectoryGeneratorConfig:
         1.0, "the same for its rotation [rad/s^2]", low=1e-3, high=100.0
     )
 
+    speed_m_s: float = parameter(
+        0.01, "follow_head_trajectory: speed of the tip, if none is given [m/s]", low=1e-4, high=1.0
+    )
+    turning_speed_rad_s: float = parameter(
+        0.1,
+        "follow_head_trajectory: speed of each of roll, pitch and yaw, if none is given [rad/s]",
+        low=1e-4,
+        high=10.0,
+    )
+    arrival_position_m: float = parameter(
+        0.01, "follow_head_trajectory: the head has arrived within this [m]", low=1e-4, high=1.0
+    )
+    arrival_rotation_rad: float = parameter(
+        0.05, "follow_head_trajectory: the head has arrived within this [rad]", low=1e-3, high=3.0
+    )
+    arrival_timeout_s: float = parameter(
+        20.0,
+        "follow_head_trajectory: how long the head may be away from the end after the reference "
+        "has come there [s]",
+        low=0.1,
+        high=600.0,
+    )
+
     def __post_init__(self) -> None:
         for name in ("start_pose", "velocity"):
             values = getattr(self, name)

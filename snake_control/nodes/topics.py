@@ -19,6 +19,7 @@ from rclpy.qos import (
     qos_profile_sensor_data,
 )
 from sensor_msgs.msg import JointState
+from snake_interfaces.action import FollowHeadTrajectory
 from snake_interfaces.msg import (
     BusState,
     ControllerState,
@@ -54,6 +55,14 @@ class Topic:
             reliability=self.qos.reliability,
             durability=self.qos.durability,
         )
+
+
+@dataclasses.dataclass(frozen=True)
+class Action:
+    """An action's name and type."""
+
+    name: str
+    type: Any
 
 
 @dataclasses.dataclass(frozen=True)
@@ -107,3 +116,5 @@ CLEAR_FAULTS = Service("~/clear_faults", Trigger)
 ENABLE = Service("~/enable", SetBool)
 START = Service("~/start", Trigger)
 STOP = Service("~/stop", Trigger)
+
+FOLLOW_HEAD_TRAJECTORY = Action("follow_head_trajectory", FollowHeadTrajectory)

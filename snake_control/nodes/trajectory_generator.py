@@ -1,6 +1,7 @@
 """Node ``trajectory_generator``: sends ``head/reference`` for a trajectory or for ``cmd_vel``.
 
-Nothing is sent before ``~/start`` (or the parameter ``autostart``) or ``cmd_vel``. ``~/stop``, or
+Nothing is sent before ``~/start`` (or the parameter ``autostart``), ``cmd_vel`` or a goal of the
+action ``follow_head_trajectory``. ``~/stop``, or
 ``cmd_vel`` that ceases, brings the reference to rest; then it is no longer sent, and the controller
 reports a stale reference and commands zero. ``cmd_vel`` takes over from whatever is being followed,
 unless it is zero: a joystick at rest starts and takes over nothing.
@@ -18,6 +19,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
 from geometry_msgs.msg import PoseStamped, TwistStamped
 from nav_msgs.msg import Path
 from numpy import float64
@@ -33,13 +35,16 @@ from snake_control.nodes.conversions import (
     head_motion,
     head_velocity_command,
     header,
+    joint_motion,
     pose_message,
     reference_message,
     stamp_ns,
 )
+from snake_control.nodes.head_action import HeadAction, Surroundings
 from snake_control.nodes.inputs import FUTURE_TOLERANCE_S, Input
 from snake_control.nodes.parameters import NodeParameters
 from snake_control.nodes.process import run
+from snake_control.trajectory.plan import Plan
 from snake_control.trajectory.sequence import Outcome, ReferenceSequence
 
 # How the planned path of a line is drawn.
@@ -53,20 +58,27 @@ class TrajectoryGenerator(Node):
 
     def __init__(self, **overrides: Any) -> None:
         super().__init__("trajectory_generator", **overrides)
-        config = NodeParameters(self, "trajectory_generator").config.trajectory_generator
-        self._config = config
+        configured = NodeParameters(self, "trajectory_generator").config
+        self._config = config = configured.trajectory_generator
         self._sequence = ReferenceSequence(config)
         self._autostart = config.autostart
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._origin_ns = self._steady.now().nanoseconds
         self._cmd_vel_stamp_ns = 0
-        self._scale, self._scale_heard_s = 1.0, -math.inf
+        self._controller: ControllerState | None = None
+        self._heard_s = -math.inf
         self._has_path = False
         self._head = Input(
             topics.HEAD_ODOMETRY.name,
             config.head_timeout_s,
             lambda message: head_motion(message, config.frame_id)[0],
         )
+        self._joints = Input(
+            topics.JOINT_STATES.name,
+            config.head_timeout_s,
+            lambda message: joint_motion(message, configured.robot.joint_names)[0],
+        )
+        self._action = HeadAction(self, configured, self._sequence, self._publish_plan)
 
         t = topics.HEAD_REFERENCE
         self._reference = self.create_publisher(t.type, t.name, t.qos)
@@ -74,6 +86,8 @@ class TrajectoryGenerator(Node):
         self._path = self.create_publisher(t.type, t.name, t.qos)
         t = topics.HEAD_ODOMETRY
         self.create_subscription(t.type, t.name, self._head.receive, t.newest_only)
+        t = topics.JOINT_STATES
+        self.create_subscription(t.type, t.name, self._joints.receive, t.newest_only)
         t = topics.CONTROLLER_STATE
         self.create_subscription(t.type, t.name, self._on_controller_state, t.newest_only)
         t = topics.CMD_VEL
@@ -83,8 +97,7 @@ class TrajectoryGenerator(Node):
         self.create_timer(1.0 / config.rate_hz, self._step, clock=self._steady)
 
     def _on_controller_state(self, message: ControllerState) -> None:
-        if 0.0 <= message.reference_scale <= 1.0:
-            self._scale, self._scale_heard_s = message.reference_scale, self._steady_s()
+        self._controller, self._heard_s = message, self._steady_s()
 
     def _now(self) -> int:
         return self.get_clock().now().nanoseconds
@@ -100,9 +113,14 @@ class TrajectoryGenerator(Node):
         now = self._now()
         if self._autostart and self._head_pose(now) is not None:
             self._start(now)
-        heard = self._steady_s() - self._scale_heard_s <= _CONTROLLER_SILENT_S
-        self._sequence.time_scale = self._scale if heard else 1.0
-        reference = self._sequence.sample(self._steady_s())
+        steady = self._steady_s()
+        heard = steady - self._heard_s <= _CONTROLLER_SILENT_S
+        controller = self._controller if heard else None
+        scale = 1.0 if controller is None else controller.reference_scale
+        self._sequence.time_scale = scale if 0.0 <= scale <= 1.0 else 1.0
+        phi = None if self._joints.problem(now) else self._joints.value
+        self._action.step(Surroundings(steady, self._head_pose(now), phi, controller))
+        reference = self._sequence.sample(steady)
         if reference is not None:
             self._reference.publish(reference_message(reference, now, self._config.frame_id))
             if self._sequence.idle:
@@ -113,6 +131,7 @@ class TrajectoryGenerator(Node):
         self._autostart = False
         outcome = self._sequence.start(self._steady_s(), self._head_pose(now))
         if outcome.done:
+            self._action.take_over("~/start")
             self._publish_path(now)
         self.get_logger().info(f"start: {outcome.text}")
         return outcome
@@ -125,6 +144,7 @@ class TrajectoryGenerator(Node):
     def _on_stop(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         now = self._now()
         self._autostart = False
+        self._action.let_stop()
         outcome = self._sequence.stop(self._steady_s())
         self._publish_path(now)
         self.get_logger().info(f"stop: {outcome.text}")
@@ -159,12 +179,24 @@ class TrajectoryGenerator(Node):
         if not self._sequence.commanded:
             return
         self._autostart = False
+        self._action.take_over("cmd_vel")
         if was_idle:
             self.get_logger().info(outcome.text)
         self._publish_path(now)
 
     def _ignore_cmd_vel(self, reason: str) -> None:
         self.get_logger().warning(f"cmd_vel ignored: {reason}", throttle_duration_sec=1.0)
+
+    def _publish_plan(self, plan: Plan) -> None:
+        """Show a goal's motion."""
+        now, frame = self._now(), self._config.frame_id
+        motion = plan.made()(0.0)
+        path = Path(header=header(now, frame))
+        for t in np.linspace(0.0, plan.duration, _PATH_POINTS).tolist():
+            stamp = header(now + round(t * 1e9), frame)
+            path.poses.append(PoseStamped(header=stamp, pose=pose_message(motion.sample(t).w_d)))
+        self._has_path = True
+        self._path.publish(path)
 
     def _publish_path(self, now: int) -> None:
         """Show the line, or that there is none any more."""
@@ -184,6 +216,7 @@ class TrajectoryGenerator(Node):
 
     def close(self) -> None:
         """References cease, and the controller then commands zero."""
+        self._action.close()
 
 
 def main() -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -102,6 +103,24 @@ class ReferenceSequence:
         if self._config.trajectory == "hold":
             return Outcome(True, "holding the head where it is")
         return Outcome(True, f"following the line from {self._config.start_from}")
+
+    def here(self, now: float, head: Array | None) -> Reference | None:
+        """Return where a motion that takes over would begin: the reference, or the head at rest.
+
+        ``None`` if there is no reference and the head is not known.
+        """
+        if self._trajectory is not None:
+            return self._trajectory.sample(self.motion_time(now))
+        return None if head is None else Reference(head, np.zeros(6))
+
+    def follow(self, made: Callable[[float], HeadTrajectory], now: float) -> None:
+        """Follow a motion from now on, whatever was followed before.
+
+        Args:
+            made: makes it for the time at which it starts; it begins ``here``.
+            now: time of the steady clock [s].
+        """
+        self._trajectory = made(self.motion_time(now))
 
     def stop(self, now: float) -> Outcome:
         """Bring the head to rest from what it does at ``now`` [s], then give no reference."""

@@ -1,4 +1,4 @@
-"""Through poses at given times: a cubic spline, C2, at rest at both ends."""
+"""Through poses at given times: a cubic spline, C2, at rest at its end."""
 
 from __future__ import annotations
 
@@ -17,10 +17,11 @@ from snake_control.trajectory.motion_limits import PITCH_LIMIT_RAD
 Array = NDArray[np.float64]
 
 _REST_S = 1e-3
+_SAMPLES = 20
 
 
 class Waypoints:
-    """Position and attitude through poses.
+    """Position and attitude through poses, from the rate given to rest.
 
     The attitude is interpolated as roll, pitch and yaw, each by the shorter way round: the
     coordinates of the controller, which have no pole within the pitch limit.
@@ -29,7 +30,13 @@ class Waypoints:
         duration: from the first to the last pose [s].
     """
 
-    def __init__(self, times: Sequence[float], poses: ArrayLike, start: float = 0.0) -> None:
+    def __init__(
+        self,
+        times: Sequence[float],
+        poses: ArrayLike,
+        start: float = 0.0,
+        rate: ArrayLike | None = None,
+    ) -> None:
         """Define the motion.
 
         Args:
@@ -37,6 +44,7 @@ class Waypoints:
             poses: [x, y, z, R, P, Y] of each, (k, 6) [m, rad], two or more.
             start: time of the clock at the first pose [s]; before it that is held, and the last one
                 after the end.
+            rate: of [x, y, z, R, P, Y] at the first pose, (6,) [m/s, rad/s]; 0 by default.
 
         Raises:
             TrajectoryError: names the pose that is wrong.
@@ -46,7 +54,23 @@ class Waypoints:
         w[1:, 3:] = w[0, 3:] + np.cumsum(wrap(np.diff(w[:, 3:], axis=0)), axis=0)
         self.duration = float(t[-1] - t[0])
         self._start = start
-        self._spline = CubicSpline(t - t[0], w, bc_type="clamped")
+        first = np.zeros(6) if rate is None else np.array(rate, dtype=float)
+        self._spline = CubicSpline(t - t[0], w, bc_type=((1, first), (1, np.zeros(6))))
+
+    def fastest(self) -> tuple[float, float, float]:
+        """Return the largest speeds of the tip [m/s] and of R, P, Y [rad/s], and of |P| [rad]."""
+        turns = self._spline.derivative().roots(extrapolate=False)[4]
+        at = np.union1d(
+            np.linspace(0.0, self.duration, _SAMPLES * len(self._spline.x)),
+            turns[np.isfinite(turns)],
+        )
+        rates = self._spline(at, 1)
+        pitch = float(np.abs(self._spline(at)[:, 4]).max())
+        return (
+            float(np.linalg.norm(rates[:, :3], axis=1).max()),
+            float(np.abs(rates[:, 3:]).max()),
+            pitch,
+        )
 
     def sample(self, t: float) -> Reference:
         """Return pose, rate and acceleration at time ``t`` [s]."""

@@ -1,0 +1,166 @@
+"""The action ``follow_head_trajectory`` through all nodes and the mock robot."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+from action_msgs.msg import GoalStatus
+from builtin_interfaces.msg import Duration
+from rclpy.action import ActionClient
+from snake_interfaces.action import FollowHeadTrajectory
+
+from snake_control.nodes import topics
+from snake_control.nodes.conversions import array, pose_message, stamp_ns
+from support.whole_graph import WholeGraph
+
+Result = FollowHeadTrajectory.Result
+
+
+class Client:
+    """Sends goals and keeps the feedback."""
+
+    def __init__(self, robot: WholeGraph) -> None:
+        self.robot, self.graph = robot, robot.graph
+        action = topics.FOLLOW_HEAD_TRAJECTORY
+        self._client = ActionClient(self.graph.node, action.type, action.name)
+        self.graph.wait_for(self._client.server_is_ready, 30.0, "the action server")
+        self.feedback: list = []
+
+    def poses(self, *ways: tuple[float, ...]) -> list:
+        """Poses by their distance from where the head is now."""
+        return [pose_message(self.robot.w + np.array(way)) for way in ways]
+
+    def send(self, poses, **more):
+        """Send a goal; return its handle."""
+        goal = FollowHeadTrajectory.Goal(poses=poses, **more)
+        goal.header.frame_id = more.get("header") or "world"
+        sent = self._client.send_goal_async(
+            goal, feedback_callback=lambda m: self.feedback.append(m.feedback)
+        )
+        self.graph.wait_for(sent.done, 20.0, "acceptance")
+        handle = sent.result()
+        assert handle.accepted
+        self._result = handle.get_result_async()
+        return handle
+
+    def result(self, timeout_s: float = 60.0):
+        """Wait for the status and result of the goal sent last."""
+        self.graph.wait_for(self._result.done, timeout_s, "the result")
+        got = self._result.result()
+        return got.status, got.result
+
+    def follow(self, poses, **more):
+        self.send(poses, **more)
+        return self.result()
+
+
+@pytest.fixture(scope="module")
+def robot(tmp_path_factory):
+    with WholeGraph(tmp_path_factory.mktemp("action")) as robot:
+        yield robot
+
+
+@pytest.fixture
+def client(robot):
+    return Client(robot)
+
+
+def jumps(robot: WholeGraph) -> float:
+    """Largest step of the reference beyond what its twist explains [m]."""
+    messages = robot.references.messages
+    worst = 0.0
+    for a, b in itertools.pairwise(messages):
+        dt = (stamp_ns(b) - stamp_ns(a)) * 1e-9
+        if dt > 0.1:
+            continue
+        step = array(b.pose.position) - array(a.pose.position)
+        fastest = max(np.linalg.norm(array(m.twist.linear)) for m in (a, b))
+        worst = max(worst, float(np.linalg.norm(step)) - (fastest * dt + 5e-4))
+    return worst
+
+
+def test_the_head_goes_through_the_poses_and_tells_how_far_it_is(robot, client):
+    robot.references.clear()
+    start = robot.w
+    poses = client.poses((0.02, 0, 0, 0, 0, 0), (0.04, 0.005, 0, 0, 0, 0.1))
+    goal = robot.w + np.array([0.04, 0.005, 0, 0, 0, 0.1])
+    status, result = client.follow(poses, speed=0.02)
+    assert (status, result.code) == (GoalStatus.STATUS_SUCCEEDED, Result.NONE), result.text
+    assert result.position_error <= 0.01
+    np.testing.assert_allclose(robot.w[:3], goal[:3], atol=0.012)
+    assert np.linalg.norm(robot.w[:3] - start[:3]) > 0.025
+    phases = [feedback.phase for feedback in client.feedback]
+    assert "rehearsing" in phases
+    assert "moving" in phases
+    progress = [feedback.progress for feedback in client.feedback]
+    assert progress == sorted(progress)
+    assert progress[-1] == 1.0
+    assert jumps(robot) <= 0.0
+
+
+@pytest.mark.parametrize(
+    ("way", "more", "code", "words"),
+    [
+        ((0, 0, 0.3, 0, 0, 0), {"speed": 0.03}, Result.UNREACHABLE, "hold it up after"),
+        ((0.1, 0, 0, 0, 0, 0), {"speed": 0.5}, Result.INVALID, "max_linear_speed_m_s"),
+        ((float("nan"), 0, 0, 0, 0, 0), {}, Result.INVALID, "pose 0"),
+        (
+            (0.1, 0, 0, 0, 0, 0),
+            {"time_from_start": [Duration(sec=-3)]},
+            Result.INVALID,
+            "pose 0 is to be reached at -3",
+        ),
+    ],
+)
+def test_what_cannot_be_is_told_and_nothing_moves(robot, client, way, more, code, words):
+    before = robot.w
+    status, result = client.follow(client.poses(way), **more)
+    assert (status, result.code) == (GoalStatus.STATUS_ABORTED, code), result.text
+    assert words in result.text
+    np.testing.assert_allclose(robot.w, before, atol=5e-3)
+
+
+def test_a_canceled_goal_slows_down_to_rest(robot, client):
+    robot.references.clear()
+    handle = client.send(client.poses((0.2, 0, 0, 0, 0, 0)), speed=0.03, skip_rehearsal=True)
+    client.graph.wait_for(
+        lambda: any(f.phase == "moving" and f.progress > 0.1 for f in client.feedback),
+        30.0,
+        "motion",
+    )
+    canceled = handle.cancel_goal_async()
+    client.graph.wait_for(canceled.done, 10.0, "the answer to the cancellation")
+    status, result = client.result()
+    assert (status, result.code) == (GoalStatus.STATUS_CANCELED, Result.CANCELED)
+    assert jumps(robot) <= 0.0
+    last = robot.references.messages[-1]
+    assert np.linalg.norm(array(last.twist.linear)) < 1e-3
+
+
+def test_a_newer_goal_takes_over_without_a_jump(robot, client):
+    robot.references.clear()
+    client.send(client.poses((0.2, 0, 0, 0, 0, 0)), speed=0.03, skip_rehearsal=True)
+    first = client._result
+    client.graph.wait_for(
+        lambda: any(f.phase == "moving" and f.progress > 0.1 for f in client.feedback),
+        30.0,
+        "motion",
+    )
+    status, result = client.follow(
+        client.poses((0.02, 0.0, 0, 0, 0, 0)), speed=0.02, skip_rehearsal=True
+    )
+    assert first.result().result.code == Result.PREEMPTED
+    assert first.result().status == GoalStatus.STATUS_ABORTED
+    assert (status, result.code) == (GoalStatus.STATUS_SUCCEEDED, Result.NONE), result.text
+    assert jumps(robot) <= 0.0
+
+
+def test_stop_ends_a_goal_at_rest(robot, client):
+    client.send(client.poses((0.2, 0, 0, 0, 0, 0)), speed=0.03, skip_rehearsal=True)
+    client.graph.wait_for(lambda: any(f.phase == "moving" for f in client.feedback), 30.0, "motion")
+    stop = topics.STOP
+    assert robot.graph.call("trajectory_generator", stop, stop.type.Request()).success
+    status, result = client.result()
+    assert (status, result.code) == (GoalStatus.STATUS_ABORTED, Result.CANCELED)
