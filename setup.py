@@ -5,7 +5,14 @@ from glob import glob
 from setuptools import find_packages, setup
 
 NAME = "snake_control"
-NODES = ("bus_driver", "pose_input", "scp_controller", "trajectory_generator", "mock_bus")
+NODES = (
+    "bus_driver",
+    "pose_input",
+    "scp_controller",
+    "trajectory_generator",
+    "keyboard_teleop",
+    "mock_bus",
+)
 COMMANDS = ("demo", "evaluate", "experiment", "scp_study")
 
 setup(

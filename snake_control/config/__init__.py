@@ -17,10 +17,12 @@ from snake_control.config.loader import (
     is_ros_parameter,
     known_parameters,
     load,
+    node_kinds,
     refuse_unknown,
 )
 from snake_control.config.nodes import (
     BusDriverConfig,
+    KeyboardTeleopConfig,
     MockBusConfig,
     PoseInputConfig,
     ScpControllerConfig,
@@ -42,6 +44,7 @@ __all__ = [
     "Circle",
     "Config",
     "ControllerConfig",
+    "KeyboardTeleopConfig",
     "MockBusConfig",
     "Parameter",
     "PoseInputConfig",
@@ -56,6 +59,7 @@ __all__ = [
     "load",
     "matches",
     "namespace_and_name",
+    "node_kinds",
     "parameter_files",
     "parameters_of_node",
     "read_sections",

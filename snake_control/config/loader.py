@@ -11,6 +11,7 @@ from typing import Any
 from snake_control.config.controller import ControllerConfig
 from snake_control.config.nodes import (
     BusDriverConfig,
+    KeyboardTeleopConfig,
     MockBusConfig,
     PoseInputConfig,
     ScpControllerConfig,
@@ -33,6 +34,7 @@ _NODE_GROUPS: dict[str, type] = {
     "pose_input": PoseInputConfig,
     "scp_controller": ScpControllerConfig,
     "trajectory_generator": TrajectoryGeneratorConfig,
+    "keyboard_teleop": KeyboardTeleopConfig,
     "mock_bus": MockBusConfig,
 }
 _SHARED_GROUPS_OF_NODE: dict[str, tuple[str, ...]] = {
@@ -40,6 +42,7 @@ _SHARED_GROUPS_OF_NODE: dict[str, tuple[str, ...]] = {
     "pose_input": (),
     "scp_controller": ("robot", "controller", "supervisor"),
     "trajectory_generator": ("robot", "controller", "supervisor"),
+    "keyboard_teleop": (),
     "mock_bus": ("robot", "servos"),
 }
 # Parameters that rclpy itself declares in every node.
@@ -59,6 +62,7 @@ class Config:
     pose_input: PoseInputConfig
     scp_controller: ScpControllerConfig
     trajectory_generator: TrajectoryGeneratorConfig
+    keyboard_teleop: KeyboardTeleopConfig
     mock_bus: MockBusConfig
 
 
@@ -139,6 +143,11 @@ def known_parameters(nodes: Iterable[str]) -> dict[str, Parameter]:
     for node in nodes:
         known.update(parameters(_NODE_GROUPS[node]))
     return known
+
+
+def node_kinds() -> tuple[str, ...]:
+    """Return the kinds of nodes that have parameters."""
+    return tuple(_NODE_GROUPS)
 
 
 def is_ros_parameter(field: str) -> bool:

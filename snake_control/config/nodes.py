@@ -227,6 +227,15 @@ class TrajectoryGeneratorConfig:
         0.0, "length of the line, 0 for endless; its end is held [s]", low=0.0
     )
     autostart: bool = parameter(False, "start as soon as the head pose is known")
+    cmd_vel_stamped: bool = parameter(
+        True, "cmd_vel is a TwistStamped; false: a Twist, as older teleoperation nodes send it"
+    )
+    cmd_vel_frame: str = parameter(
+        "link_1",
+        "frame in which a cmd_vel without a stamp is meant: world, or link_1 for the level frame "
+        "that looks where the head looks",
+        choices=("world", "link_1"),
+    )
     head_timeout_s: float = parameter(
         0.1,
         "a motion that starts where the head is needs a head pose this fresh [s]",
@@ -280,6 +289,23 @@ class TrajectoryGeneratorConfig:
             values = getattr(self, name)
             if len(values) != 6:
                 raise ConfigError(name, list(values), "give 6 numbers: x, y, z, R, P, Y")
+
+
+@dataclasses.dataclass(frozen=True)
+class KeyboardTeleopConfig:
+    """Parameters of the node ``keyboard_teleop``."""
+
+    rate_hz: float = parameter(20.0, "cmd_vel messages per second", low=5.0, high=100.0)
+    speed_m_s: float = parameter(0.02, "speed of the head at scale 1 [m/s]", low=1e-4, high=1.0)
+    turning_speed_rad_s: float = parameter(
+        0.15, "speed of its rotation at scale 1 [rad/s]", low=1e-3, high=10.0
+    )
+    hold_s: float = parameter(
+        0.6,
+        "how long a key counts: a keyboard repeats a key that is held only after a pause [s]",
+        low=0.05,
+        high=2.0,
+    )
 
 
 @dataclasses.dataclass(frozen=True)

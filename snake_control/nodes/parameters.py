@@ -22,6 +22,7 @@ from snake_control.config import (
     from_parameters,
     is_ros_parameter,
     known_parameters,
+    node_kinds,
     refuse_unknown,
 )
 from snake_control.errors import ConfigError
@@ -73,9 +74,7 @@ class NodeParameters:
         self._checked: tuple[Config, Any] | None = None
         given = {n: p.value for n, p in node.get_parameters_by_prefix("").items()}
         # A file may serve all nodes through one /** section.
-        known_to_any = known_parameters(
-            ("bus_driver", "pose_input", "scp_controller", "trajectory_generator", "mock_bus")
-        )
+        known_to_any = known_parameters(node_kinds())
         for name, value in given.items():
             if is_ros_parameter(name):
                 continue

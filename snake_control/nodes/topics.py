@@ -9,7 +9,7 @@ import dataclasses
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import PoseStamped, TwistStamped
+from geometry_msgs.msg import PoseStamped, Twist, TwistStamped
 from nav_msgs.msg import Odometry, Path
 from rclpy.qos import (
     DurabilityPolicy,
@@ -101,6 +101,7 @@ HEAD_STATUS = Topic("head/status", PoseStatus, _STATE)
 HEAD_REFERENCE = Topic("head/reference", HeadReference, _COMMAND)
 HEAD_PLANNED_PATH = Topic("head/planned_path", Path, _LATCHED)
 CMD_VEL = Topic("cmd_vel", TwistStamped, _COMMAND)
+CMD_VEL_UNSTAMPED = Topic("cmd_vel", Twist, _COMMAND)
 
 CONTROLLER_STATE = Topic("controller_state", ControllerState, _STATE)
 MARKERS = Topic("markers", MarkerArray, _COMMAND)

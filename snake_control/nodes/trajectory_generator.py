@@ -20,7 +20,7 @@ import math
 from typing import Any
 
 import numpy as np
-from geometry_msgs.msg import PoseStamped, TwistStamped
+from geometry_msgs.msg import PoseStamped, Twist, TwistStamped
 from nav_msgs.msg import Path
 from numpy import float64
 from numpy.typing import NDArray
@@ -31,6 +31,7 @@ from std_srvs.srv import Trigger
 
 from snake_control.nodes import topics
 from snake_control.nodes.conversions import (
+    HEAD_FRAME,
     MessageError,
     head_motion,
     head_velocity_command,
@@ -90,8 +91,9 @@ class TrajectoryGenerator(Node):
         self.create_subscription(t.type, t.name, self._joints.receive, t.newest_only)
         t = topics.CONTROLLER_STATE
         self.create_subscription(t.type, t.name, self._on_controller_state, t.newest_only)
-        t = topics.CMD_VEL
-        self.create_subscription(t.type, t.name, self._on_cmd_vel, t.qos)
+        t = topics.CMD_VEL if config.cmd_vel_stamped else topics.CMD_VEL_UNSTAMPED
+        callback = self._on_cmd_vel if config.cmd_vel_stamped else self._on_unstamped_cmd_vel
+        self.create_subscription(t.type, t.name, callback, t.qos)
         self.create_service(topics.START.type, topics.START.name, self._on_start)
         self.create_service(topics.STOP.type, topics.STOP.name, self._on_stop)
         self.create_timer(1.0 / config.rate_hz, self._step, clock=self._steady)
@@ -150,6 +152,11 @@ class TrajectoryGenerator(Node):
         self.get_logger().info(f"stop: {outcome.text}")
         response.success, response.message = outcome.done, outcome.text
         return response
+
+    def _on_unstamped_cmd_vel(self, message: Twist) -> None:
+        frame = self._config.cmd_vel_frame
+        frame = HEAD_FRAME if frame == HEAD_FRAME else self._config.frame_id
+        self._on_cmd_vel(TwistStamped(header=header(0, frame), twist=message))
 
     def _on_cmd_vel(self, message: TwistStamped) -> None:
         now = self._now()

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from geometry_msgs.msg import TwistStamped
+from geometry_msgs.msg import Twist, TwistStamped
 from nav_msgs.msg import Odometry
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_srvs.srv import Trigger
@@ -286,3 +286,35 @@ def test_an_incompatible_publisher_is_reported():
             lambda: "incompatible QoS" in rig.process.output(), 20.0, "the report of the QoS"
         )
         assert "cmd_vel" in rig.process.output()
+
+
+@pytest.mark.parametrize(("frame", "rate"), [("world", [0.02, 0, 0]), ("link_1", [0, 0.02, 0])])
+def test_a_twist_without_a_stamp_is_meant_in_the_configured_frame(frame, rate):
+    with Graph() as graph:
+        references = graph.subscribe(topics.HEAD_REFERENCE)
+        head = graph.publisher(topics.HEAD_ODOMETRY)
+        twists = graph.publisher(topics.CMD_VEL_UNSTAMPED)
+        graph.start(
+            NODE,
+            params_files=[PAPER_ROBOT],
+            params={"cmd_vel_stamped": False, "cmd_vel_frame": frame},
+        )
+        graph.wait_for(twists.get_subscription_count, 30.0, NODE)
+
+        def publish():
+            where = Odometry(header=header(graph.now_ns(), "world"), child_frame_id="link_1")
+            where.pose.pose = pose_message(HEAD)
+            head.publish(where)
+            twists.publish(Twist(linear=vector((0.02, 0, 0))))
+
+        graph.every(0.02, publish)
+        graph.wait_for(
+            lambda: (
+                references.last
+                and np.allclose(
+                    reference_from(references.last, "world").w_d_dot[:3], rate, atol=5e-4
+                )
+            ),
+            20.0,
+            "the commanded velocity",
+        )

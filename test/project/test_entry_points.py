@@ -10,7 +10,14 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-NODES = {"bus_driver", "pose_input", "scp_controller", "trajectory_generator", "mock_bus"}
+NODES = {
+    "bus_driver",
+    "pose_input",
+    "scp_controller",
+    "trajectory_generator",
+    "keyboard_teleop",
+    "mock_bus",
+}
 COMMANDS = {"ax12", "demo", "evaluate", "experiment", "scp_study"}
 
 
