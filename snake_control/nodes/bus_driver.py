@@ -242,7 +242,7 @@ class BusDriver(ManagedNode):
     # Topics out.
 
     def _publish(self, snapshot: Snapshot) -> None:
-        """Publish one cycle; called by the bus thread, which has nothing else to do now."""
+        """Publish one cycle; called by a thread that has nothing else to do."""
         now, now_ns = time.monotonic(), self.get_clock().now().nanoseconds
         self._last = snapshot
         age = now - snapshot.oldest_at

@@ -15,6 +15,7 @@ from concurrent.futures import Future
 from snake_control.config import Config
 from snake_control.errors import BusError
 from snake_control.nodes.bus_control import HOLD_CYCLES, BusControl
+from snake_control.nodes.bus_outbox import Outbox
 from snake_control.nodes.bus_requests import RefusedError, Requests
 from snake_control.nodes.bus_schedule import Schedule
 from snake_control.nodes.bus_snapshot import Snapshot, State
@@ -30,6 +31,7 @@ _PUBLISH_FAILURES = (
     ValueError,
 )
 _LOG_PERIOD_S = 1.0
+_LAST_WORDS_S = 1.0
 
 
 class BusLoop:
@@ -45,13 +47,14 @@ class BusLoop:
         """Prepare; nothing is opened yet.
 
         Args:
-            publish: called after each cycle, in the thread of the loop.
+            publish: called after each cycle, in a thread of its own: it may block.
             warn, error: take one line for the log, from any thread.
         """
         self._driver = config.bus_driver
-        self._control = BusControl(config, warn, error)
+        self._control = BusControl(config, self._said_by(warn), self._said_by(error))
         self._publish = publish
         self._error = error
+        self._outbox: Outbox | None = None
         self._period = 1.0 / self._driver.rate_hz
         self._schedule = Schedule(self._period)
         self._requests = Requests()
@@ -79,6 +82,7 @@ class BusLoop:
         angles = self._control.start()
         self._stopping = self._torque_off_at_end = False
         self._requests = Requests()
+        self._outbox = Outbox(self._deliver)
         self._thread = threading.Thread(target=self._run, name="bus", daemon=True)
         self._thread.start()
         return angles
@@ -225,6 +229,8 @@ class BusLoop:
             finally:
                 self._control.forsake()
                 self._requests.end()
+                assert self._outbox is not None
+                self._outbox.close(_LAST_WORDS_S)
 
     def _turn(self) -> None:
         self._schedule.begin(time.monotonic())
@@ -236,7 +242,8 @@ class BusLoop:
         busy = self._control.busy
         state, text, read_begin = self._control.cycle(begin)
         end = time.monotonic()
-        self._tell(self._snapshot(state, text, begin, read_begin, end), end)
+        assert self._outbox is not None
+        self._outbox.put(self._snapshot(state, text, begin, read_begin, end))
         if busy and not self._control.busy:
             # What ends a lowering takes longer than a cycle.
             self._schedule.start(time.monotonic())
@@ -262,11 +269,25 @@ class BusLoop:
             emergency=control.emergency,
         )
 
-    def _tell(self, snapshot: Snapshot, now: float) -> None:
+    def _said_by(self, log: Callable[[str], None]) -> Callable[[str], None]:
+        """Return a log that the thread of the loop may use: logging may block, too."""
+
+        def say(text: str) -> None:
+            if self._outbox is not None and threading.current_thread() is self._thread:
+                self._outbox.say(log, text)
+            else:
+                log(text)
+
+        return say
+
+    # In the thread of the outbox.
+
+    def _deliver(self, snapshot: Snapshot) -> None:
         try:
             self._publish(snapshot)
         except _PUBLISH_FAILURES as error:
             # The joints must go on being led whoever may hear of it.
+            now = time.monotonic()
             if now - self._publish_logged_at >= _LOG_PERIOD_S:
                 self._publish_logged_at = now
                 self._error(f"the state cannot be published: {error!r}")

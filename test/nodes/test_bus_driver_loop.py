@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -328,6 +329,33 @@ def test_what_moves_comes_to_rest_before_servos_are_asked_and_armed(
         goals = [p for p in servos.packets[:first] if p[4] == SYNC_WRITE and p[5] == 30][-1]
         for at in range(7, len(goals) - 1, 5):
             assert abs(int.from_bytes(goals[at + 1 : at + 3], "little") - 512) <= 6
+
+
+def test_whoever_keeps_a_state_from_being_published_does_not_keep_the_joints_from_stopping(
+    servos: ScriptedServos,
+) -> None:
+    free = threading.Event()
+    with driving(servos) as driver:
+        driver.move()
+        # A subscriber that is frozen may hold what the middleware shares with it.
+        driver.on_publish = lambda: free.wait(20.0) and None
+        try:
+            sent = len(servos.packets)
+            driver.loop.command(AHEAD, 0.0)
+
+            def held() -> bool:
+                goals = [p for p in servos.packets[sent:] if p[4] == SYNC_WRITE and p[5] == 30]
+                # Fifty cycles later; the command has run out after five.
+                if len(goals) < 50:
+                    return False
+                at = [int.from_bytes(goals[-1][i + 1 : i + 3], "little") for i in range(7, 60, 5)]
+                return all(abs(goal - 512) <= 6 for goal in at)
+
+            wait_for(held, 10.0, "the joints' hold")
+            driver.loop.emergency_stop()
+        finally:
+            free.set()
+        driver.wait_for_state(State.EMERGENCY_STOP)
 
 
 def wheel(servos: ScriptedServos, servo_id: int) -> tuple[str, ...]:
