@@ -70,6 +70,17 @@ class Barriers:
         """Return the limits as they are seen from joint angles, (n-1,) [rad]."""
         return BarriersAt(self, phi)
 
+    @property
+    def widths(self) -> dict[Limit, float]:
+        """How far each margin is from its stop threshold to its warning threshold."""
+        c = self._config
+        return {
+            Limit.FALL: c.d_min_warn_m - c.d_min_stop_m,
+            Limit.SINGULAR_BODY: c.nearness_stop - c.nearness_warn,
+            Limit.SINGULAR_HEAD: c.regularity_warn - c.regularity_stop,
+            Limit.JOINT_RANGE: c.range_warn_rad,
+        }
+
     def bounds(self, phi: Array) -> tuple[Array, Array, NDArray[np.bool_], NDArray[np.bool_]]:
         """Return lowest and highest joint velocities, and where these are due to the ranges."""
         rate = self._config.approach_rate_per_s
@@ -115,6 +126,7 @@ class BarriersAt:
     Attributes:
         lowest, highest: bounds of the joint velocities, (n-1,) [rad/s].
         margins: what is left of the limits of the whole body (``Barriers.margins``).
+        lifted: limits that do not count at present.
     """
 
     def __init__(self, barriers: Barriers, phi: Array) -> None:
@@ -122,6 +134,7 @@ class BarriersAt:
         self._phi = phi
         self.lowest, self.highest, self._by_lower, self._by_upper = barriers.bounds(phi)
         self.margins = barriers.margins(phi)
+        self.lifted: frozenset[Limit] = frozenset()
 
     def largest_share(self, start: Array, way: Array) -> tuple[float, Bound | None]:
         """Return the largest t of 0..1 with start + t way allowed, and what ends it.
@@ -177,7 +190,7 @@ class BarriersAt:
         """Return the limit of the whole body that a motion does not respect."""
         ahead = self._barriers.margins(self._phi + self._barriers.horizon_s * u)
         for limit, margin in self.margins.items():
-            if ahead[limit] < self._least(margin):
+            if limit not in self.lifted and ahead[limit] < self._least(margin):
                 return limit
         return None
 

@@ -32,13 +32,7 @@ class Escape:
         self._robot = robot
         self._config = config
         self._barriers = barriers
-        c = config
-        self._widths = {
-            Limit.FALL: c.d_min_warn_m - c.d_min_stop_m,
-            Limit.SINGULAR_BODY: c.nearness_stop - c.nearness_warn,
-            Limit.SINGULAR_HEAD: c.regularity_warn - c.regularity_stop,
-            Limit.JOINT_RANGE: c.range_warn_rad,
-        }
+        self._widths = barriers.widths
         self._rest = [0.0] * len(robot.controlled)
 
     def dangers(

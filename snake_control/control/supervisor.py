@@ -35,6 +35,7 @@ SUB_TASK_SHARE = 0.5
 """Share of the joints' speed limits that the sub-tasks may use with the head at rest."""
 
 _CALMEST = 0.01
+_REGAINED = 0.5
 _PLAIN = dataclasses.fields(ControlResult)
 
 
@@ -111,6 +112,8 @@ class Supervisor:
         self._sub_task_motion = self._at_rest
         self._calm = 1.0
         self._dangers: dict[Limit, float] = {}
+        self._lifted: set[Limit] = set()
+        self._begins = True
 
     def step(
         self, q: ArrayLike, q_dot: ArrayLike | None, reference: Reference, t: float
@@ -133,6 +136,7 @@ class Supervisor:
         posture, error = self._law.look(q, reference)
         phi = posture.g.q[6:]
         at = self._barriers.at(phi)
+        self._lift(at)
         self._dangers = dangers = self._escape.dangers(at, phi, self._dangers)
         fade = 1.0 - max(dangers.values(), default=0.0)
         away = self._escape.velocities(posture, dangers) if dangers else 0.0
@@ -180,6 +184,22 @@ class Supervisor:
             accelerating=accelerating,
             holding=holding,
         )
+
+    def _lift(self, at: BarriersAt) -> None:
+        """Let a motion that begins in a singular posture lead out of it by whatever way.
+
+        Singular postures are no danger as long as joint speeds are limited, but where the way out
+        makes one worse at first, the robot would stand there for ever.
+        """
+        widths = self._barriers.widths
+        near: set[Limit] = {
+            limit
+            for limit, margin in at.margins.items()
+            if limit is not Limit.FALL and margin < _REGAINED * widths[limit]
+        }
+        self._lifted = near if self._begins else self._lifted & near
+        self._begins = False
+        at.lifted = frozenset(self._lifted)
 
     def _sub_task_share(self, posture: Posture, scps: Array) -> float:
         """Return the share of the sub-tasks' own motion that leaves the head its joint speeds.

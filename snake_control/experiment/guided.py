@@ -113,6 +113,10 @@ class GuidedRobot:
                 scale = sample.result.reference_scale
             own += self._dt * scale
 
+    def pause(self) -> None:
+        """Have no reference for a moment: the next one is a new start."""
+        self._supervisor.rest()
+
     def insist(
         self, reference: Callable[[float], Reference], duration: float
     ) -> Iterator[GuidedSample]:

@@ -119,6 +119,8 @@ def test_a_nearly_straight_body_becomes_straighter_ever_more_slowly() -> None:
     beyond = Barriers(ROBOT, tight).at(phi)
     assert not beyond.allows(straighter)
     assert beyond.allows(-straighter)
+    beyond.lifted = frozenset({Limit.SINGULAR_BODY})
+    assert beyond.allows(straighter)
     free = dataclasses.replace(CONFIG, nearness_stop=1.0)
     assert Limit.SINGULAR_BODY not in Barriers(ROBOT, free).at(phi).margins
 

@@ -175,6 +175,19 @@ def test_it_holds_and_says_so_and_goes_on_at_once_when_led_away(config: Config) 
     assert not seen[-1].result.holding  # type: ignore[union-attr]
 
 
+def test_a_motion_that_begins_in_a_singular_posture_may_lead_out_by_any_way(
+    config: Config,
+) -> None:
+    phi = np.array(config.robot.start_joint_angles_rad)
+    phi[5:] = [0.02, 0.02, 0.02, -0.02, -0.02, -0.02]
+    q = np.concatenate((head_pose_on_floor(config.robot, phi, np.zeros(3)), phi))
+    ahead = Reference(q[:6], np.array([0.01, 0.0, 0.0, 0.0, 0.0, 0.0]))
+    made = supervisor(config, escape_speed_rad_s=0.0)
+    first = made.step(q, None, ahead, 0.0)
+    assert first.singular_shape.nearness > config.supervisor.nearness_stop
+    assert first.bound is None or first.bound.limit is not Limit.SINGULAR_BODY
+
+
 def test_a_gradient_without_bounds_leaves_the_head_its_joint_speeds(config: Config) -> None:
     wild = dataclasses.replace(config, controller=dataclasses.replace(config.controller, a_b=1e6))
     start = GuidedRobot(wild)

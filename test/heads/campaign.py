@@ -132,6 +132,8 @@ def try_hostile(number: int, servos: str = "perfect") -> Outcome:
     # Back to the usual height and attitude, from where the head is by now.
     w = robot.state.w
     goal = np.array([*w[:2], *START[2:5], w[5]])
+    # The reference is stopped before another one is started.
+    robot.pause()
     begin = robot.t
     after = list(robot.follow(Approach(Hold(goal), w, 0.0, 8.0).sample, 8.0, 30.0))
     off = [s.t - begin for s in after if _error(s)[0] > TRACKED_M]
