@@ -86,9 +86,7 @@ class BusDriver(ManagedNode):
         self._bus_state = self._publisher(topics.BUS_STATE)
         self._diagnostics = self._publisher(topics.DIAGNOSTICS)
         self._emergency_active = self._publisher(topics.EMERGENCY_STOP_ACTIVE)
-        self._loop = BusLoop(
-            self._config, self._publish, self.get_logger().warning, self.get_logger().error
-        )
+        self._loop = BusLoop(self._config, self._publish, self._warn, self._complain)
         self._tell_emergency()
         command = topics.JOINT_VELOCITY_COMMAND
         self.create_subscription(command.type, command.name, self._take_command, command.qos)
@@ -238,6 +236,14 @@ class BusDriver(ManagedNode):
         if now - self._ignored_logged_at >= _LOG_PERIOD_S:
             self._ignored_logged_at = now
             self.get_logger().warning(f"command ignored: {why} ({self._ignored} so far)")
+
+    # On lines of their own: rclpy ties one severity to each line that logs.
+
+    def _warn(self, text: str) -> None:
+        self.get_logger().warning(text)
+
+    def _complain(self, text: str) -> None:
+        self.get_logger().error(text)
 
     # Topics out.
 
