@@ -6,9 +6,10 @@ slower it may be approached, and it is never passed (a control barrier function,
 form of Agrawal and Sreenath, Robotics: Science and Systems 2017). Where h is negative already, no
 motion may make it worse.
 
-Ranges and speeds of the joints are linear in u and give bounds for it. The margin against falling
-and the nearness of a singular shape are worked out at phi + u T, with the base level on the floor:
-exact also where the nearest edge of the support polygon changes, which a derivative is not.
+Ranges and speeds of the joints are linear in u and give bounds for it. The margin against falling,
+the nearness of a singular shape and the regularity of the head's posture are worked out at
+phi + u T, with the base level on the floor: exact also where the nearest edge of the support
+polygon changes, which a derivative is not.
 """
 
 from __future__ import annotations

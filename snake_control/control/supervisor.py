@@ -7,13 +7,15 @@ In this order, each only as far as the one before does not suffice:
    its path (whoever sends the reference reads ``reference_scale`` and slows down with it);
 3. the correction of the error is slowed, then the motion of the SCPs: at last the robot holds.
 
-No step depends on how the robot came where it is, but for the acceleration limit: a reference that
-leads away from a limit is followed at once.
+A reference that leads away from a limit is followed at once: what is remembered from step to step
+only smooths the motion (the last command, the pace of the reference and of the sub-tasks), names
+what lasts (dangers, holding), and lets a motion that begins in a singular posture lead out of it.
 """
 
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,9 +25,13 @@ from snake_control.control.barriers import Barriers, BarriersAt, Bound, Limit
 from snake_control.control.escape import Escape
 from snake_control.control.reference import Reference
 from snake_control.control.scp_controller import ControlResult, ScpController
+from snake_control.errors import SnakeError
 from snake_control.model.posture import Posture
 
 Array = NDArray[np.float64]
+
+NO_ANSWER = (SnakeError, ArithmeticError, np.linalg.LinAlgError)
+"""What a step raises where a posture, or a sub-task of somebody else's, has no answer."""
 
 HOLDING_BELOW = 0.05
 """Share of the wanted motion of the head below which the robot counts as holding."""
@@ -72,10 +78,7 @@ class _Scaled:
 
 
 class Supervisor:
-    """``ScpController`` within limits.
-
-    It remembers the last command (for the acceleration limit) and since when the robot holds.
-    """
+    """``ScpController`` within limits."""
 
     def __init__(
         self,
@@ -115,6 +118,12 @@ class Supervisor:
         self._lifted: set[Limit] = set()
         self._begins = True
 
+    def go_on_from(self, before: Supervisor) -> None:
+        """Take over a motion under way: parameters have changed, the robot has not."""
+        self._u = before._u
+        self._reference_scale = before._reference_scale
+        self._begins = False
+
     def step(
         self, q: ArrayLike, q_dot: ArrayLike | None, reference: Reference, t: float
     ) -> SupervisedResult:
@@ -145,10 +154,10 @@ class Supervisor:
         forward = self._law.feedforward(reference)
 
         resting_scps = self._law.sub_tasks(posture, self._still)
-        share = fade * self._sub_task_share(posture, resting_scps)
+        sub_tasks = fade * self._sub_task_share(posture, resting_scps) * resting_scps
 
         def motion(w_dot: list[float]) -> tuple[Array, Array]:
-            scps = share * resting_scps + away
+            scps = sub_tasks + away
             if self._law.scps_follow_head:
                 scps = scps + self._law.sub_tasks(posture, w_dot) - resting_scps
             return scps, posture.k.joint_velocities(w_dot, scps.tolist())
@@ -156,14 +165,14 @@ class Supervisor:
         scale = reference.time_scale
         full = [scale * f + b for f, b in zip(forward, back, strict=True)]
         phi_tilde_dot_d, wanted = motion(full)
-        scaled = self._scaled(at, wanted, full, back, scale, motion)
+        scaled = self._scaled(at, wanted, lambda w_dot: motion(w_dot)[1], back, scale)
         u, accelerating = self._accelerated(at, scaled.u)
         self._u = u
         self._let_reference_go(scaled.reference)
         # What the head was given of what it should do.
         given = scaled.reference / scale if scale > 0.0 and any(forward) else scaled.feedback
-        share = self._reference_scale if any(forward) else scaled.feedback
-        holding = self._holds(share, bool(any(forward) or any(back)), t)
+        pace = self._reference_scale if any(forward) else scaled.feedback
+        holding = self._holds(pace, any(forward) or any(back), t)
         self._bound = scaled.bound or (self._bound if holding else None)
         return SupervisedResult(
             posture=posture,
@@ -215,12 +224,26 @@ class Supervisor:
         excess = float((np.abs(motion) / self._sub_task_speeds).max(initial=0.0))
         return self._calm / max(excess, 1.0)
 
-    def _scaled(self, at, wanted, full, back, scale, motion) -> _Scaled:  # type: ignore[no-untyped-def]
-        """Return the largest allowed part of a motion."""
+    def _scaled(
+        self,
+        at: BarriersAt,
+        wanted: Array,
+        motion: Callable[[list[float]], Array],
+        back: list[float],
+        scale: float,
+    ) -> _Scaled:
+        """Return the largest allowed part of a motion.
+
+        Args:
+            at: what is allowed.
+            wanted: joint velocities, (n-1,) [rad/s].
+            motion: gives those for a velocity of the head.
+            back: velocity of the head that corrects the error.
+            scale: pace of the reference in ``wanted``.
+        """
         if at.allows(wanted):
             return _Scaled(wanted, 1.0, 1.0, 1.0, None)
-        _, resting = motion(self._still)
-        _, correcting = motion(back)
+        resting, correcting = motion(self._still), motion(back)
         share, bound = at.largest_share(correcting, wanted - correcting)
         if share >= 0.0:
             u = correcting + share * (wanted - correcting)
@@ -250,9 +273,9 @@ class Supervisor:
         rise = self._config.scale_rise_per_s * self._period_s
         self._reference_scale = min(allowed, self._reference_scale + rise)
 
-    def _holds(self, share: float, asked: bool, t: float) -> bool:
+    def _holds(self, pace: float, asked: bool, t: float) -> bool:
         """Return whether the head has been given next to nothing of its motion for a while."""
-        if not asked or share > HOLDING_BELOW:
+        if not asked or pace > HOLDING_BELOW:
             self._held_since = None
             return False
         if self._held_since is None:

@@ -46,6 +46,7 @@ def rehearse(
     w: ArrayLike,
     reference: Callable[[float], Reference],
     duration: float,
+    given_up: Callable[[], bool] = lambda: False,
 ) -> Rehearsal:
     """Try a motion in lockstep with perfect servos, from where the robot stands.
 
@@ -55,6 +56,7 @@ def rehearse(
         w: head pose, (6,) [m, rad]: its x, y and Y count, the floor decides the rest.
         reference: wanted pose by time since the start [s].
         duration: planned length [s].
+        given_up: asked in every cycle; ends it.
     """
     robot = GuidedRobot(config, phi=phi, w=w)
     slowed: dict[Limit, float] = {}
@@ -63,6 +65,8 @@ def rehearse(
     late: GuidedSample | None = None
     sample = None
     for sample in robot.follow(reference, duration, SLOWEST * duration):
+        if given_up():
+            return Rehearsal(False, "given up", 0.0, 0.0, 0.0)
         result = sample.result
         if result is None:
             where = _where(sample, duration)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import threading
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 
@@ -21,6 +22,7 @@ from snake_interfaces.action import FollowHeadTrajectory
 from snake_interfaces.msg import ControllerState
 
 from snake_control.config import Config
+from snake_control.control.supervisor import NO_ANSWER
 from snake_control.errors import SnakeError
 from snake_control.experiment.rehearsal import Rehearsal, rehearse
 from snake_control.model.rotation import wrap
@@ -71,6 +73,7 @@ class _Run:
     since: float | None = None
     plan: Plan | None = None
     rehearsal: Future[Rehearsal] | None = None
+    over: threading.Event = dataclasses.field(default_factory=threading.Event)
     began: float | None = None
     arriving_since: float | None = None
     stopped_since: float | None = None
@@ -112,15 +115,16 @@ class HeadAction:
         )
 
     def close(self) -> None:
-        """Serve no more."""
+        """Serve no more; a rehearsal ends at once."""
+        if self._run is not None:
+            self._run.over.set()
         self._worker.shutdown(wait=False, cancel_futures=True)
         self._server.destroy()
 
     def take_over(self, by: str) -> None:
         """End a goal because something else gives the reference from now on."""
-        run = self._run
-        if run is not None and not run.stopping:
-            self._end(run, Result.PREEMPTED, f"{by} took over")
+        if self._run is not None:
+            self._end(self._run, Result.PREEMPTED, f"{by} took over")
 
     def let_stop(self) -> None:
         """End a goal when the head has come to rest: ``~/stop`` was called."""
@@ -141,7 +145,8 @@ class HeadAction:
             return
         if run.handle.is_cancel_requested and not run.stopping:
             run.stopping = True
-            self._sequence.stop(around.now)
+            if run.began is not None:
+                self._sequence.stop(around.now)
         if run.stopping:
             self._feed_back(run, around, "stopping")
             if run.began is None or self._sequence.idle:
@@ -176,7 +181,13 @@ class HeadAction:
         quick = dataclasses.replace(self._config.scp_controller, rate_hz=_REHEARSAL_HZ)
         config = dataclasses.replace(self._config, scp_controller=quick)
         run.rehearsal = self._worker.submit(
-            rehearse, config, around.phi, around.head, plan.made()(0.0).sample, plan.duration
+            rehearse,
+            config,
+            around.phi,
+            around.head,
+            plan.made()(0.0).sample,
+            plan.duration,
+            run.over.is_set,
         )
 
     def _planned(self, run: _Run, around: Surroundings) -> Plan | None:
@@ -200,7 +211,7 @@ class HeadAction:
     ) -> None:
         try:
             found = rehearsal.result()
-        except SnakeError as error:
+        except NO_ANSWER as error:
             self._end(run, Result.UNREACHABLE, f"the rehearsal failed: {error}", around)
             return
         if not found.possible:
@@ -266,6 +277,7 @@ class HeadAction:
         run.handle.publish_feedback(feedback)
 
     def _end(self, run: _Run, code: int, text: str, around: Surroundings | None = None) -> None:
+        run.over.set()
         result = Result(code=code, text=text)
         result.position_error, result.rotation_error = (
             (math.nan, math.nan) if around is None else self._error(around)
@@ -276,8 +288,7 @@ class HeadAction:
             run.handle.canceled()
         else:
             run.handle.abort()
-        log = self._node.get_logger()
-        log.info(f"follow_head_trajectory ended: {text}")
+        self._node.get_logger().info(f"follow_head_trajectory ended: {text}")
         if self._run is run:
             self._run = None
         run.done.set_result(result)

@@ -21,8 +21,7 @@ from std_srvs.srv import SetBool
 
 from snake_control.config import Config
 from snake_control.control.reference import Reference
-from snake_control.control.supervisor import Supervisor
-from snake_control.errors import SnakeError
+from snake_control.control.supervisor import NO_ANSWER, Supervisor
 from snake_control.model.rotation import unwrap_near
 from snake_control.nodes import markers, topics
 from snake_control.nodes.controller_messages import ControllerMessages, Step, judge, too_far
@@ -39,8 +38,6 @@ _STATUS_OF_FAULT = {
     Fault.STALE: ControllerState.STATUS_STALE,
     Fault.INVALID: ControllerState.STATUS_INVALID,
 }
-# What arithmetic raises where a posture, or a sub-task of somebody else's, has no answer.
-_NO_ANSWER = (SnakeError, ArithmeticError, np.linalg.LinAlgError)
 
 _REASON_OF_FAULT = {
     Fault.WAITING: ControllerState.REASON_NO_INPUT,
@@ -125,8 +122,9 @@ class ScpControllerNode(Node):
 
     def _on_parameters(self, config: Config) -> None:
         self._gains = config.controller
-        self._controller = self._configured.prepared
-        self.get_logger().info(f"gains changed: {config.controller}")
+        before, self._controller = self._controller, self._configured.prepared
+        self._controller.go_on_from(before)
+        self.get_logger().info(f"parameters changed: {config.controller}, {config.supervisor}")
 
     def _on_enable(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
         self._enabled = request.data
@@ -143,7 +141,7 @@ class ScpControllerNode(Node):
         elapsed = time.perf_counter() - started
         try:
             state = self._messages.state(step, self._gains, elapsed)
-        except _NO_ANSWER as error:
+        except NO_ANSWER as error:
             # The state asks more of the posture than the command, which has gone: take it back.
             _give_up(step, error)
             self._command.publish(self._messages.command(step))
@@ -246,7 +244,7 @@ class ScpControllerNode(Node):
         t = (self._steady.now().nanoseconds - self._origin_ns) * 1e-9
         try:
             result = self._controller.step(q, q_dot, reference, t)
-        except _NO_ANSWER as error:
+        except NO_ANSWER as error:
             _give_up(step, error)
             return
         if not np.isfinite(result.u).all():
@@ -270,7 +268,7 @@ class ScpControllerNode(Node):
         if not self._head.problem(now) and not self._joint_states.problem(now):
             q = np.concatenate([self._head.value[0], self._joint_states.value[0]])
             # A posture that the step refuses, and says so, cannot be drawn either.
-            with contextlib.suppress(*_NO_ANSWER):
+            with contextlib.suppress(*NO_ANSWER):
                 found += markers.robot_markers(self._robot, q, now, frame)
         if not self._reference.problem(now):
             length = 4 * self._robot.half_length_m

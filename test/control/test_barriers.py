@@ -10,7 +10,7 @@ import pytest
 from snake_control.config import RobotConfig, SupervisorConfig, load
 from snake_control.control.barriers import Barriers, Limit
 from snake_control.control.limits import RANGE_MARGIN_RAD
-from support.graph import CONFIG as CONFIG_DIRECTORY
+from snake_control.experiment.cases import config_directory
 
 ROBOT = RobotConfig()
 CONFIG = SupervisorConfig()
@@ -126,6 +126,6 @@ def test_a_nearly_straight_body_becomes_straighter_ever_more_slowly() -> None:
 
 
 def test_a_planar_snake_has_no_head_to_be_singular() -> None:
-    planar = load(CONFIG_DIRECTORY / "planar_snake.yaml").robot
+    planar = load(config_directory() / "planar_snake.yaml").robot
     margins = Barriers(planar, CONFIG).at(np.array(planar.start_joint_angles_rad)).margins
     assert set(margins) == {Limit.FALL, Limit.SINGULAR_BODY}

@@ -7,17 +7,18 @@ import dataclasses
 import numpy as np
 import pytest
 
-from snake_control.config import Config, SupervisorConfig
+from snake_control.config import Config, SupervisorConfig, load
 from snake_control.control.barriers import Limit
 from snake_control.control.reference import Reference
 from snake_control.control.scp_controller import ScpController
 from snake_control.control.supervisor import HOLDING_AFTER_S, HOLDING_BELOW, Supervisor
-from snake_control.experiment.cases import load_case
+from snake_control.experiment.cases import config_directory, load_case
 from snake_control.experiment.guided import GuidedRobot
 from snake_control.model.floor import head_pose_on_floor
 from snake_control.trajectory.approach import Approach
 from snake_control.trajectory.hold import Hold
 from snake_control.trajectory.line import Line
+from support.experiments import LONG_ROBOT
 
 DT = 0.02
 
@@ -186,6 +187,38 @@ def test_a_motion_that_begins_in_a_singular_posture_may_lead_out_by_any_way(
     first = made.step(q, None, ahead, 0.0)
     assert first.singular_shape.nearness > config.supervisor.nearness_stop
     assert first.bound is None or first.bound.limit is not Limit.SINGULAR_BODY
+
+
+@pytest.mark.parametrize("file", ["planar_snake.yaml", "scale_free.yaml"])
+def test_other_robots_are_kept_within_their_limits_too(file: str) -> None:
+    if file == "planar_snake.yaml":
+        config = load(config_directory() / file)
+    else:
+        config = dataclasses.replace(
+            load(config_directory() / "paper_robot.yaml", config_directory() / file)
+        )
+        config = dataclasses.replace(config, robot=LONG_ROBOT)
+    robot = GuidedRobot(config)
+    rush = Line(robot.state.w, (0.3, 0.0, 0.0, 0.0, 0.0, 0.0), 0.0)
+    seen = list(robot.insist(rush.sample, 4.0))
+    speeds = np.array(config.robot.joint_speed_limits_rad_s)
+    assert any(s.result.bound is not None for s in seen)  # type: ignore[union-attr]
+    assert all((np.abs(s.result.u) <= speeds * (1 + 1e-9)).all() for s in seen)  # type: ignore[union-attr]
+    bounds = np.array(config.robot.joint_limits_rad).reshape(-1, 2)
+    assert all(((bounds[:, 0] <= s.state.phi) & (s.state.phi <= bounds[:, 1])).all() for s in seen)
+    assert not robot.state.fallen
+
+
+def test_a_change_of_parameters_does_not_interrupt_a_motion(
+    config: Config, start: np.ndarray, table_1: Reference
+) -> None:
+    before = supervisor(config)
+    u = settled(config, before, start, table_1).u
+    after = supervisor(config, scale_rise_per_s=0.5)
+    after.go_on_from(before)
+    result = after.step(start, None, table_1, 1.0)
+    assert not result.accelerating
+    np.testing.assert_array_equal(result.u, u)
 
 
 def test_a_gradient_without_bounds_leaves_the_head_its_joint_speeds(config: Config) -> None:

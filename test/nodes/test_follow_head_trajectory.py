@@ -157,6 +157,25 @@ def test_a_newer_goal_takes_over_without_a_jump(robot, client):
     assert jumps(robot) <= 0.0
 
 
+def test_a_goal_that_is_canceled_while_it_is_rehearsed_moves_nothing(robot, client):
+    before = len(robot.references.messages)
+    # Minutes of motion: the rehearsal takes seconds, and ends when it is told to.
+    ways = [(0.02 * (i % 2), 0, 0, 0, 0, 0) for i in range(200)]
+    handle = client.send(client.poses(*ways), speed=0.01)
+    client.graph.wait_for(
+        lambda: any(f.phase == "rehearsing" for f in client.feedback), 20.0, "the rehearsal"
+    )
+    canceled = handle.cancel_goal_async()
+    client.graph.wait_for(canceled.done, 10.0, "the answer to the cancellation")
+    status, result = client.result(10.0)
+    assert (status, result.code) == (GoalStatus.STATUS_CANCELED, Result.CANCELED)
+    # What was followed before goes on as it was: here the end of an earlier motion, or nothing.
+    moving = [m for m in robot.references.messages[before:] if np.any(array(m.twist.linear))]
+    assert moving == []
+    status, result = client.follow(client.poses((0.01, 0, 0, 0, 0, 0)), speed=0.02)
+    assert result.code == Result.NONE, result.text
+
+
 def test_stop_ends_a_goal_at_rest(robot, client):
     client.send(client.poses((0.2, 0, 0, 0, 0, 0)), speed=0.03, skip_rehearsal=True)
     client.graph.wait_for(lambda: any(f.phase == "moving" for f in client.feedback), 30.0, "motion")
