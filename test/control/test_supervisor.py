@@ -191,12 +191,8 @@ def test_a_motion_that_begins_in_a_singular_posture_may_lead_out_by_any_way(
 
 @pytest.mark.parametrize("file", ["planar_snake.yaml", "scale_free.yaml"])
 def test_other_robots_are_kept_within_their_limits_too(file: str) -> None:
-    if file == "planar_snake.yaml":
-        config = load(config_directory() / file)
-    else:
-        config = dataclasses.replace(
-            load(config_directory() / "paper_robot.yaml", config_directory() / file)
-        )
+    config = load(config_directory() / file)
+    if not config.robot.planar:
         config = dataclasses.replace(config, robot=LONG_ROBOT)
     robot = GuidedRobot(config)
     rush = Line(robot.state.w, (0.3, 0.0, 0.0, 0.0, 0.0, 0.0), 0.0)
