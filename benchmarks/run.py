@@ -9,7 +9,7 @@ import os
 import platform
 from pathlib import Path
 
-from benchmarks import bus_cycle, dynamics, growth, lockstep, pink_ik
+from benchmarks import bus_cycle, dynamics, growth, latency, lockstep, pink_ik
 
 # Name in the result: what measures it, from the number of blocks and of calls in a block.
 BENCHMARKS = {
@@ -19,6 +19,7 @@ BENCHMARKS = {
     "reduced_dynamics": dynamics.measure,
     "lockstep_case_3": lockstep.measure,
     "bus_cycle": bus_cycle.measure,
+    "latency": latency.measure,
 }
 
 

@@ -26,15 +26,35 @@ _SIGN_OF_LIFE_S = 0.5
 class _Command:
     velocities: tuple[float, ...]
     computed_at: float
+    stamp_ns: int
+    taken_at: float
+
+
+@dataclasses.dataclass(frozen=True)
+class Followed:
+    """The command that a cycle follows.
+
+    Attributes:
+        stamp_ns: of its message [ns].
+        waited: time from its arrival to the cycle's begin [s].
+    """
+
+    stamp_ns: int
+    waited: float
 
 
 class CommandBuffer:
-    """Buffer of one command; any thread may write or read. Times are monotonic [s]."""
+    """Buffer of one command; any thread may write or read. Times are monotonic [s].
+
+    Attributes:
+        followed: what ``newest`` gave last; ``None`` if that was to hold.
+    """
 
     def __init__(self, timeout: float) -> None:
         """Start empty; a command is executed until ``timeout`` seconds after it was computed."""
         self._timeout = timeout
         self._command: _Command | None = None
+        self.followed: Followed | None = None
         self._waiting_since: float | None = None
         self._heard_at = -math.inf
         self._refused: tuple[float, str] = (-math.inf, "")
@@ -54,7 +74,7 @@ class CommandBuffer:
     def _listening(self, now: float) -> bool:
         return self._alive_at == -math.inf or now - self._alive_at <= _SIGN_OF_LIFE_S
 
-    def take(self, velocities: Sequence[float], age: float, now: float) -> None:
+    def take(self, velocities: Sequence[float], age: float, now: float, stamp_ns: int = 0) -> None:
         """Take joint velocities [rad/s] that were computed ``age`` seconds ago."""
         with self._lock:
             silent = now - self._heard_at > max(_PAUSE_S, self._timeout)
@@ -66,7 +86,7 @@ class CommandBuffer:
                 if not zero or now - since <= _PAUSE_S:
                     return
             self._waiting_since = None
-            self._command = _Command(tuple(velocities), now - age)
+            self._command = _Command(tuple(velocities), now - age, stamp_ns, now)
 
     def refuse(self, why: str, now: float) -> None:
         """Say in the coming texts that a command was not taken."""
@@ -107,12 +127,14 @@ class CommandBuffer:
         with self._lock:
             command, waiting = self._command, self._waiting_since is not None
             heard_at = self._heard_at
+        self.followed = None
         if waiting and now - heard_at <= self._timeout:
             return None, "holding: waiting for a zero command"
         if command is None:
             return None, "holding: no command yet"
         if now - command.computed_at > self._timeout:
             return None, f"holding: no command for {self._timeout:.2f} s"
+        self.followed = Followed(command.stamp_ns, now - command.taken_at)
         return command.velocities, "moving"
 
     def refusal(self, now: float) -> str:

@@ -16,6 +16,7 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from typing import Any
 
+from builtin_interfaces.msg import Time
 from rclpy.clock import Clock, ClockType
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 from snake_interfaces.msg import JointVelocityCommand
@@ -39,6 +40,7 @@ from snake_control.nodes.bus_messages import (
 )
 from snake_control.nodes.bus_requests import NotLoweredError
 from snake_control.nodes.bus_snapshot import Snapshot, State
+from snake_control.nodes.conversions import stamp_ns
 from snake_control.nodes.managed import ManagedNode, logged
 from snake_control.nodes.parameters import NodeParameters
 from snake_control.nodes.process import THREAD_SWITCH_S, run
@@ -227,7 +229,7 @@ class BusDriver(ManagedNode):
         except InvalidCommandError as error:
             self._ignore(str(error))
             return
-        self._loop.command(velocities, age)
+        self._loop.command(velocities, age, stamp_ns(message))
 
     def _ignore(self, why: str) -> None:
         self._ignored += 1
@@ -260,8 +262,14 @@ class BusDriver(ManagedNode):
             self._joint_stamp_ns = stamp_ns
             stamp = time_message(stamp_ns)
             self._joint_states.publish(self._messages.joint_state(snapshot, stamp))
-        stamp = time_message(now_ns - round(_NS * max(0.0, now - snapshot.read_at)))
-        self._bus_state.publish(self._messages.bus_state(snapshot, self._health, stamp))
+
+        def at(monotonic: float) -> Time:
+            return time_message(now_ns - round(_NS * max(0.0, now - monotonic)))
+
+        sent = None if snapshot.followed is None else at(snapshot.goals_sent_at)
+        self._bus_state.publish(
+            self._messages.bus_state(snapshot, self._health, at(snapshot.read_at), sent)
+        )
 
     def _publish_diagnostics(self) -> None:
         snapshot, driver = self._last, self._config.bus_driver

@@ -114,9 +114,9 @@ class BusLoop:
                 f"the bus thread ended unexpectedly, its traceback is above: {self._mistake}"
             )
 
-    def command(self, velocities: Sequence[float], age: float) -> None:
+    def command(self, velocities: Sequence[float], age: float, stamp_ns: int = 0) -> None:
         """Take joint velocities [rad/s] that were computed ``age`` seconds ago."""
-        self._control.commands.take(velocities, age, time.monotonic())
+        self._control.commands.take(velocities, age, time.monotonic(), stamp_ns)
 
     def refuse_command(self, why: str) -> None:
         """Say in the coming states that a command was not taken."""
@@ -252,6 +252,7 @@ class BusLoop:
         self, state: State, text: str, begin: float, read_begin: float, end: float
     ) -> Snapshot:
         control, chain = self._control, self._control.session.chain
+        moving = state is State.MOVING and chain is not None
         readings = () if chain is None else tuple(chain.readings())
         return Snapshot(
             state=state,
@@ -262,6 +263,8 @@ class BusLoop:
             cycle_time=end - begin,
             cycle_rate=self._schedule.rate,
             command_age=control.commands.age(begin),
+            followed=control.commands.followed if moving else None,
+            goals_sent_at=read_begin,
             cycles=self._schedule.cycles,
             late_cycles=self._schedule.late_cycles,
             error_rate=0.0 if chain is None else chain.error_rate,

@@ -18,6 +18,7 @@ from snake_control.nodes.bus_snapshot import Snapshot, State
 
 _NS = 1_000_000_000
 _UNKNOWN = "no reading yet"
+_NEVER = Time()
 
 _STATE_LEVELS = {
     State.STOPPED: Level.ERROR,
@@ -72,7 +73,9 @@ class StateMessages:
         message.velocity = [reading.rate for reading in snapshot.readings]
         return message
 
-    def bus_state(self, snapshot: Snapshot, health: Health, stamp: Time) -> BusState:
+    def bus_state(
+        self, snapshot: Snapshot, health: Health, stamp: Time, goals_sent: Time | None = None
+    ) -> BusState:
         """Return the whole state; without a port the servos keep what was last known of them."""
         message = self._bus_state
         message.header.stamp = stamp
@@ -81,6 +84,10 @@ class StateMessages:
         message.cycle_time = snapshot.cycle_time
         message.cycle_rate = snapshot.cycle_rate
         message.command_age = snapshot.command_age
+        followed = snapshot.followed
+        message.command_stamp = time_message(0 if followed is None else followed.stamp_ns)
+        message.command_waited = math.nan if followed is None else followed.waited
+        message.goals_sent = _NEVER if goals_sent is None else goals_sent
         message.cycles = snapshot.cycles
         message.late_cycles = snapshot.late_cycles
         message.communication_error_rate = snapshot.error_rate

@@ -6,6 +6,7 @@ import dataclasses
 import enum
 
 from snake_control.ax12.driven_joint import JointReading
+from snake_control.nodes.bus_command import Followed
 
 
 class State(enum.IntEnum):
@@ -33,6 +34,8 @@ class Snapshot:
         cycle_time: from the first byte to the last [s].
         cycle_rate: measured [Hz].
         command_age: [s], infinite without a command.
+        followed: the command that the goals follow; ``None`` if they follow none.
+        goals_sent_at: when they had left, on the monotonic clock [s].
         cycles, late_cycles: since activation.
         error_rate: share of the last requests without a good reply at the first try.
         reconnections: how often the port was opened anew since the driver was configured.
@@ -47,6 +50,8 @@ class Snapshot:
     cycle_time: float
     cycle_rate: float
     command_age: float
+    followed: Followed | None
+    goals_sent_at: float
     cycles: int
     late_cycles: int
     error_rate: float

@@ -36,6 +36,7 @@ class Step:
         controlled: components of w, from 0, that the controller moves (not all, if planar).
         result: what the control law decided; ``None`` if the joints are commanded to rest.
         joint_states_age, head_age, reference_age: ages of the inputs [s].
+        head_waited: how long the head pose had been here when the step began [s].
     """
 
     stamp_ns: int
@@ -52,6 +53,7 @@ class Step:
     joint_states_age: float = math.inf
     head_age: float = math.inf
     reference_age: float = math.inf
+    head_waited: float = math.nan
 
     @property
     def error(self) -> Array:
@@ -203,6 +205,7 @@ class ControllerMessages:
         message.joint_states_age = step.joint_states_age
         message.head_age = step.head_age
         message.reference_age = step.reference_age
+        message.head_waited = step.head_waited
         message.step_time = step_time
         result = step.result
         if result is None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import enum
 import math
+import time
 from collections.abc import Callable
 from typing import Any, Generic, TypeVar
 
@@ -48,6 +49,7 @@ class Input(Generic[Value]):
         self._convert = convert
         self._message: Any = None
         self._stamp_ns: int | None = None
+        self._arrived_at = math.nan
         self._value: Value | None = None
         self._fault = ""
 
@@ -55,6 +57,7 @@ class Input(Generic[Value]):
         """Take a message (the callback of a subscription); it is converted when it is needed."""
         self._message = message
         self._stamp_ns = stamp_ns(message)
+        self._arrived_at = time.monotonic()
 
     @property
     def value(self) -> Value:
@@ -76,6 +79,10 @@ class Input(Generic[Value]):
     def age(self, now_ns: int) -> float:
         """Age of the newest message [s]; infinite before the first."""
         return math.inf if self._stamp_ns is None else (now_ns - self._stamp_ns) * 1e-9
+
+    def waited(self) -> float:
+        """Time since the newest message arrived [s]; NaN before the first."""
+        return time.monotonic() - self._arrived_at
 
     def problem(self, now_ns: int) -> Problem | None:
         """Return why the newest message cannot be used at ``now_ns``, ``None`` if it can."""

@@ -161,6 +161,7 @@ class ScpControllerNode(Node):
         step = Step.at(now, self._robot)
         step.joint_states_age = self._joint_states.age(now)
         step.head_age = self._head.age(now)
+        step.head_waited = self._head.waited()
         step.reference_age = self._reference.age(now)
         problems: list[Problem] = []
         w_dot = phi_dot = np.zeros(0)

@@ -79,3 +79,15 @@ def test_a_note_is_told_while_holding() -> None:
     situation = dataclasses.replace(DRIVEN, note="lowering ended")
     state, text, _ = decide(situation, CommandBuffer(0.1), 10.0)
     assert (state, text) == (State.HOLDING, "holding: no command yet; lowering ended")
+
+
+def test_what_is_followed_is_known_by_its_stamp_and_by_how_long_it_waited() -> None:
+    commands = CommandBuffer(0.1)
+    assert commands.followed is None
+    commands.take(AHEAD, 0.004, 10.0, stamp_ns=123)
+    decide(DRIVEN, commands, 10.015)
+    assert commands.followed is not None
+    assert commands.followed.stamp_ns == 123
+    assert commands.followed.waited == pytest.approx(0.015)
+    decide(DRIVEN, commands, 10.2)
+    assert commands.followed is None, "that one is too old"

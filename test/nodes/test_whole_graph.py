@@ -1,6 +1,7 @@
 """All five nodes together on a mock robot: it moves when told, and only then."""
 
 import numpy as np
+from snake_interfaces.msg import BusState
 from std_srvs.srv import Trigger
 
 from snake_control.nodes import topics
@@ -13,6 +14,25 @@ AT_REST_RAD_S = 0.05
 
 def speed(state):
     return float(np.abs(state.phi_dot).max())
+
+
+def check_the_way_from_pose_to_bus(robot):
+    """What the nodes say of waiting and of the command that a cycle follows fits together."""
+    commands = {stamp_ns(command) for command in robot.commands.messages}
+    cycles = [state for state in robot.bus.messages if state.state == BusState.STATE_MOVING]
+    # The newest command may not have been heard here yet.
+    for cycle in cycles[-100:-5]:
+        computed, sent = time_ns(cycle.command_stamp), time_ns(cycle.goals_sent)
+        assert computed in commands
+        assert cycle.command_waited * 1e9 <= sent - computed < 150 * MS
+    for step in robot.states.messages[-100:]:
+        assert 0.0 <= step.head_waited < step.head_age
+    holding = [state for state in robot.bus.messages if state.state == BusState.STATE_HOLDING]
+    assert all(time_ns(state.goals_sent) == 0 for state in holding)
+
+
+def time_ns(time):
+    return time.sec * 1_000_000_000 + time.nanosec
 
 
 def test_tracks_table_1_and_a_killed_controller_stops_the_joints(tmp_path):
@@ -43,6 +63,7 @@ def test_tracks_table_1_and_a_killed_controller_stops_the_joints(tmp_path):
             20.0,
             "commanded motion",
         )
+        check_the_way_from_pose_to_bus(robot)
         robot.processes["scp_controller"].kill()
         robot.processes["scp_controller"].wait()
         killed = robot.graph.now_ns()

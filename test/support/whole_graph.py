@@ -21,7 +21,7 @@ class WholeGraph:
     Attributes:
         graph: where they run.
         processes: by kind of node.
-        truth, commands, references, states: recorders.
+        truth, commands, references, states, bus: recorders.
     """
 
     def __init__(self, directory: Path) -> None:
@@ -36,7 +36,7 @@ class WholeGraph:
             self.commands = graph.subscribe(topics.JOINT_VELOCITY_COMMAND)
             self.references = graph.subscribe(topics.HEAD_REFERENCE)
             self.states = graph.subscribe(topics.CONTROLLER_STATE)
-            bus, head = graph.subscribe(topics.BUS_STATE), graph.subscribe(topics.HEAD_STATUS)
+            self.bus, head = graph.subscribe(topics.BUS_STATE), graph.subscribe(topics.HEAD_STATUS)
             self._cmd_vel = graph.publisher(topics.CMD_VEL)
             self.processes = {}
             for kind in (
@@ -68,7 +68,7 @@ class WholeGraph:
             )
             # It commands zeros meanwhile, and a driver wants one before it takes motion.
             graph.wait_for(
-                lambda: bus.last and bus.last.state == BusState.STATE_MOVING,
+                lambda: self.bus.last and self.bus.last.state == BusState.STATE_MOVING,
                 40.0,
                 "the driver to take commands",
             )

@@ -1,0 +1,199 @@
+"""From a pose of the motion capture to bytes on the bus, beside a bare rclpy relay.
+
+Three messages between four processes: this one sends the pose, ``pose_input`` the odometry,
+``scp_controller`` the command, and ``bus_driver`` writes goals. The robot follows its line the
+while, the mock at the other end of the port. How long a message waited for a tick of the
+controller or the driver (and for the transaction that was on the bus) the nodes say themselves;
+all else is the rest. The relay has as many messages between as many processes, and runs alone,
+before and after.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import rclpy
+from geometry_msgs.msg import PoseStamped
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+from snake_interfaces.msg import BusState, ControllerState
+
+from snake_control.cli.node_processes import NodeProcesses
+from snake_control.cli.ros_domain import own_domain
+from snake_control.nodes import topics
+
+POSES_HZ = 100.0
+RELAY_S = 8.0
+ROBOT_S = 24.0
+SETTLE_S = 4.0
+"""Left out at the start of each part: discovery, and the robot's first steps."""
+
+_ROOT = Path(__file__).parents[1]
+_START_S = 60.0
+_RAW = "mocap/raw"
+_FOLLOWING = (ControllerState.STATUS_TRACKING, ControllerState.STATUS_LIMITED)
+
+
+class _Bench(Node):
+    def __init__(self) -> None:
+        super().__init__("latency_bench")
+        self._executor = SingleThreadedExecutor()
+        self._executor.add_node(self)
+        self.steps: dict[int, ControllerState] = {}
+        self.cycles: dict[int, BusState] = {}
+        self.following = False
+
+    def spin(self, until: Callable[[], object], timeout_s: float) -> bool:
+        deadline = time.monotonic() + timeout_s
+        while not until():
+            if time.monotonic() > deadline:
+                return False
+            self._executor.spin_once(timeout_sec=0.05)
+        return True
+
+    def spin_for(self, seconds: float) -> None:
+        self.spin(lambda: False, seconds)
+
+    def stamp(self, message: PoseStamped) -> PoseStamped:
+        message.header.stamp = self.get_clock().now().to_msg()
+        return message
+
+    def hear_step(self, message: ControllerState) -> None:
+        self.following = message.status in _FOLLOWING
+        if self.following:
+            self.steps[_ns(message.header.stamp)] = message
+
+    def hear_cycle(self, message: BusState) -> None:
+        # Of a command that serves two cycles the first counts.
+        self.cycles.setdefault(_ns(message.command_stamp), message)
+
+
+def _ns(stamp) -> int:  # type: ignore[no-untyped-def]
+    return int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)
+
+
+@contextmanager
+def _relays(directory: Path) -> Iterator[Path]:
+    times = directory / "relay.json"
+    ends = (["relay_0", "relay_1"], ["relay_1", "relay_2"], ["relay_2", "--times", str(times)])
+    processes = [
+        subprocess.Popen([sys.executable, "-m", "benchmarks.relay", *end], cwd=_ROOT)
+        for end in ends
+    ]
+    try:
+        yield times
+    finally:
+        for process in processes:
+            process.send_signal(signal.SIGINT)
+        for process in processes:
+            process.wait()
+
+
+def _relay(bench: _Bench, directory: Path) -> list[float]:
+    """Return how long poses took through the relay [s]."""
+    t = topics.MOCAP_POSE
+    publisher = bench.create_publisher(t.type, "relay_0", t.qos)
+    with _relays(directory) as times:
+        if not bench.spin(publisher.get_subscription_count, _START_S):
+            raise RuntimeError("the relay does not start")
+        timer = bench.create_timer(
+            1.0 / POSES_HZ, lambda: publisher.publish(bench.stamp(PoseStamped()))
+        )
+        bench.spin_for(SETTLE_S + RELAY_S)
+        bench.destroy_timer(timer)
+    bench.destroy_publisher(publisher)
+    found: list[float] = json.loads(times.read_text())
+    return found[-round(RELAY_S * POSES_HZ) :]
+
+
+def _robot(bench: _Bench, directory: Path) -> dict[str, list[float]]:
+    """Return the times of all commands that followed a pose and reached the bus [s]."""
+    processes = NodeProcesses(directory, os.environ | {"ROS_LOG_DIR": str(directory)})
+    config = _ROOT / "config"
+    files = ["--params-file", str(config / "paper_robot.yaml")]
+    files += ["--params-file", str(config / "case_3.yaml")]
+    link = str(directory / "bus")
+    own = {
+        "mock_bus": ["-p", f"port:={link}", "-r", f"{topics.MOCAP_POSE.name}:={_RAW}"],
+        "bus_driver": ["-p", f"port:={link}"],
+        "pose_input": [],
+        "scp_controller": [],
+        "trajectory_generator": ["-p", "autostart:=true", "-p", "start_from:=head"],
+    }
+    t = topics.MOCAP_POSE
+    pose = bench.create_publisher(t.type, t.name, t.qos)
+    bench.create_subscription(t.type, _RAW, lambda m: pose.publish(bench.stamp(m)), t.qos)
+    for t, heard in (
+        (topics.CONTROLLER_STATE, bench.hear_step),
+        (topics.BUS_STATE, bench.hear_cycle),
+    ):
+        bench.create_subscription(t.type, t.name, heard, t.qos)
+    try:
+        for kind, more in own.items():
+            processes.start(kind, ["--ros-args", *files, *more])
+            if kind == "mock_bus" and not bench.spin(lambda: os.path.lexists(link), _START_S):
+                raise RuntimeError("the mock does not start")
+        if not bench.spin(lambda: bench.following, _START_S):
+            raise RuntimeError("the robot does not follow")
+        bench.spin_for(SETTLE_S)
+        bench.steps.clear()
+        bench.spin_for(ROBOT_S)
+        processes.check()
+    finally:
+        processes.stop(reversed(own), 8.0)
+    found: dict[str, list[float]] = {"end_to_end": [], "waiting": [], "rest": []}
+    for stamp, cycle in bench.cycles.items():
+        step = bench.steps.get(stamp)
+        if step is None:
+            continue
+        whole = (_ns(cycle.goals_sent) - stamp) * 1e-9 + step.head_age
+        waiting = step.head_waited + cycle.command_waited
+        found["end_to_end"].append(whole)
+        found["waiting"].append(waiting)
+        found["rest"].append(whole - waiting)
+    return found
+
+
+def _figures(name: str, times: list[float]) -> dict[str, float]:
+    return {
+        f"{name}_p50_ms": 1e3 * statistics.median(times),
+        f"{name}_p99_ms": 1e3 * float(np.percentile(times, 99)),
+    }
+
+
+def measure(_blocks: int, _calls: int) -> dict[str, dict[str, float]]:
+    """Measure relay, robot, relay, one after the other."""
+    with tempfile.TemporaryDirectory(prefix="bench_") as name, own_domain():
+        directory = Path(name)
+        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+        bench = _Bench()
+        try:
+            relay = _relay(bench, directory)
+            robot = _robot(bench, directory)
+            relay += _relay(bench, directory)
+        finally:
+            bench.destroy_node()
+            rclpy.shutdown()
+    ratio = statistics.median(robot["rest"]) / statistics.median(relay)
+    return {
+        "robot": {
+            "commands": float(len(robot["rest"])),
+            **_figures("end_to_end", robot["end_to_end"]),
+            **_figures("waiting", robot["waiting"]),
+            **_figures("rest", robot["rest"]),
+            "rest_to_relay": ratio,
+        },
+        "relay": {"poses": float(len(relay)), **_figures("relay", relay)},
+    }
