@@ -187,7 +187,8 @@ def _outcome(
     )
 
 
-def _table(title: str, outcomes: Sequence[Outcome], took: str) -> str:
+def table(title: str, outcomes: Sequence[Outcome], took: str) -> str:
+    """Return a table of outcomes; ``took`` heads the column of times."""
     lines = [
         f"## {title}",
         "",
@@ -250,8 +251,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     figures = summary(of_robot, of_others)
     given.out.mkdir(parents=True, exist_ok=True)
     text = "# Head trajectories\n\n" + "\n".join(f"* {k}: {v}" for k, v in figures.items()) + "\n\n"
-    text += _table("Those that the robot can do", of_robot, "time / nominal") + "\n"
-    text += _table("Those that it cannot or must not do", of_others, "tracked again after [s]")
+    text += table("Those that the robot can do", of_robot, "time / nominal") + "\n"
+    text += table("Those that it cannot or must not do", of_others, "tracked again after [s]")
     (given.out / "heads.md").write_text(text)
     (given.out / "heads.json").write_text(
         json.dumps(
