@@ -10,6 +10,7 @@ CASE ?= 3
 DURATION ?= 60
 SEED ?= 1
 SCENARIO ?=
+GRAPH ?=
 PACKETS ?= 1000000
 PYTHON ?=
 export PYTHON
@@ -25,7 +26,8 @@ help:
 	  'make bench   time control step, dynamics and lockstep; results in out/bench.json' \
 	  'make faults  try driver and mock with every fault; table in out/faults.md  SCENARIO=name for one' \
 	  'make heads   200 head trajectories and 100 hostile references in lockstep; table in out/heads.md' \
-  'make fuzz    a million random packets against the mock and the driver  PACKETS=n' \
+	  '             GRAPH=1: some of them through all nodes, by the wall clock' \
+	  'make fuzz    a million random packets against the mock and the driver  PACKETS=n' \
 	  'make clean   remove all that the others made' \
 	  '' \
 	  'Each does the set-up that it needs, once: packages in .venv, messages in install.' \
@@ -87,7 +89,7 @@ fuzz: build/ready
 	@. scripts/env.sh && PYTHONPATH=.:test:$$PYTHONPATH exec python -m fuzz.run --packets $(PACKETS)
 
 heads: build/ready
-	@. scripts/env.sh && PYTHONPATH=.:test:$$PYTHONPATH exec python -m heads.campaign
+	@. scripts/env.sh && PYTHONPATH=.:test:$$PYTHONPATH exec python -m heads.$(if $(GRAPH),in_graph,campaign)
 
 clean:
 	rm -rf .venv build install log out .pytest_cache .ruff_cache .mypy_cache \

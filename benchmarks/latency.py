@@ -54,6 +54,7 @@ class _Bench(Node):
         self.steps: dict[int, ControllerState] = {}
         self.cycles: dict[int, BusState] = {}
         self.following = False
+        self.text = "controller_state not heard"
 
     def spin(self, until: Callable[[], object], timeout_s: float) -> bool:
         deadline = time.monotonic() + timeout_s
@@ -71,7 +72,7 @@ class _Bench(Node):
         return message
 
     def hear_step(self, message: ControllerState) -> None:
-        self.following = message.status in _FOLLOWING
+        self.following, self.text = message.status in _FOLLOWING, message.text
         if self.following:
             self.steps[_ns(message.header.stamp)] = message
 
@@ -146,14 +147,16 @@ def _robot(bench: _Bench, directory: Path) -> dict[str, list[float]]:
             if kind == "mock_bus" and not bench.spin(lambda: os.path.lexists(link), _START_S):
                 raise RuntimeError("the mock does not start")
         if not bench.spin(lambda: bench.following, _START_S):
-            raise RuntimeError("the robot does not follow")
+            raise RuntimeError(f"the robot does not follow: {bench.text}")
         bench.spin_for(SETTLE_S)
         bench.steps.clear()
         bench.spin_for(ROBOT_S)
         processes.check()
     finally:
         processes.stop(reversed(own), 8.0)
-    found: dict[str, list[float]] = {"end_to_end": [], "waiting": [], "rest": []}
+    found: dict[str, list[float]] = {
+        name: [] for name in ("end_to_end", "waiting", "rest", "to_controller", "to_bus", "step")
+    }
     for stamp, cycle in bench.cycles.items():
         step = bench.steps.get(stamp)
         if step is None:
@@ -163,6 +166,10 @@ def _robot(bench: _Bench, directory: Path) -> dict[str, list[float]]:
         found["end_to_end"].append(whole)
         found["waiting"].append(waiting)
         found["rest"].append(whole - waiting)
+        to_controller = step.head_age - step.head_waited
+        found["to_controller"].append(to_controller)
+        found["to_bus"].append(whole - waiting - to_controller)
+        found["step"].append(step.step_time)
     return found
 
 
@@ -193,6 +200,9 @@ def measure(_blocks: int, _calls: int) -> dict[str, dict[str, float]]:
             **_figures("end_to_end", robot["end_to_end"]),
             **_figures("waiting", robot["waiting"]),
             **_figures("rest", robot["rest"]),
+            **_figures("of_it_to_controller", robot["to_controller"]),
+            **_figures("of_it_to_bus", robot["to_bus"]),
+            **_figures("of_that_step", robot["step"]),
             "rest_to_relay": ratio,
         },
         "relay": {"poses": float(len(relay)), **_figures("relay", relay)},

@@ -160,6 +160,9 @@ class ControllerMessages:
     """Makes the messages of a step; each is the same object every time, filled anew.
 
     Making them takes longer than filling them.
+
+    Attributes:
+        parameter_changes: how often parameters have been changed; to be counted by the node.
     """
 
     def __init__(self, robot: RobotConfig, frame_id: str) -> None:
@@ -173,6 +176,7 @@ class ControllerMessages:
             name=names, scp_name=[names[joint - 1] for joint in robot.scp_joints]
         )
         self._state.header.frame_id = frame_id
+        self.parameter_changes = 0
 
     def command(self, step: Step) -> JointVelocityCommand:
         """Return the command of a step: the control law's velocities, or zeros."""
@@ -197,6 +201,8 @@ class ControllerMessages:
         message.reference_scale = step.reference_scale
         message.experiment_case = gains.case
         message.preset = gains.preset
+        message.k = gains.K
+        message.parameter_changes = self.parameter_changes
         message.w = step.w
         message.w_d = step.w_d
         message.w_d_dot = step.w_d_dot

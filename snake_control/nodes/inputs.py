@@ -47,34 +47,27 @@ class Input(Generic[Value]):
         self.name = name
         self._timeout_s = timeout_s
         self._convert = convert
-        self._message: Any = None
         self._stamp_ns: int | None = None
         self._arrived_at = math.nan
         self._value: Value | None = None
         self._fault = ""
 
     def receive(self, message: Any) -> None:
-        """Take a message (the callback of a subscription); it is converted when it is needed."""
-        self._message = message
-        self._stamp_ns = stamp_ns(message)
+        """Take a message (the callback of a subscription)."""
         self._arrived_at = time.monotonic()
-
-    @property
-    def value(self) -> Value:
-        """The newest value; only after ``problem`` returned ``None``."""
-        assert self._value is not None
-        return self._value
-
-    def _convert_newest(self) -> None:
-        if self._message is None:
-            return
-        message, self._message = self._message, None
+        self._stamp_ns = stamp_ns(message)
         try:
             self._value = self._convert(message)
             self._fault = ""
         except MessageError as error:
             self._value = None
             self._fault = str(error)
+
+    @property
+    def value(self) -> Value:
+        """The newest value; only after ``problem`` returned ``None``."""
+        assert self._value is not None
+        return self._value
 
     def age(self, now_ns: int) -> float:
         """Age of the newest message [s]; infinite before the first."""
@@ -88,7 +81,6 @@ class Input(Generic[Value]):
         """Return why the newest message cannot be used at ``now_ns``, ``None`` if it can."""
         if self._stamp_ns is None:
             return Problem(Fault.WAITING, f"waiting for {self.name}")
-        self._convert_newest()
         if self._fault:
             return Problem(Fault.INVALID, f"{self.name}: {self._fault}")
         age = self.age(now_ns)

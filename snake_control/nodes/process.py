@@ -11,6 +11,7 @@ from types import FrameType
 from typing import Protocol
 
 import rclpy
+from rclpy.clock import Clock, ClockType
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
@@ -27,7 +28,13 @@ THREAD_SWITCH_S = 5e-4
 """How long a callback may keep a thread that serves a bus waiting for the interpreter (default
 5 ms); for ``sys.setswitchinterval``."""
 
+_LOOK_UP_S = 0.1
+
 _ENDING_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+def _nothing() -> None:
+    pass
 
 
 class Runnable(Protocol):
@@ -84,8 +91,11 @@ def run(make_node: Callable[..., Node], kind: str, arguments: Sequence[str] | No
         gc.freeze()
         executor = SingleThreadedExecutor()
         executor.add_node(node)
+        # Python sees a signal when a wait ends. A time-out would do that, too, but rclpy makes a
+        # timer of its own for each wait that has one, which every message would wait for.
+        node.create_timer(_LOOK_UP_S, _nothing, clock=Clock(clock_type=ClockType.STEADY_TIME))
         while rclpy.ok() and not stop.is_set():
-            executor.spin_once(timeout_sec=0.1)
+            executor.spin_once()
         return 0
     except ConfigError as error:
         print(f"configuration error: {error}", file=sys.stderr)

@@ -124,6 +124,7 @@ class ScpControllerNode(Node):
         self._gains = config.controller
         before, self._controller = self._controller, self._configured.prepared
         self._controller.go_on_from(before)
+        self._messages.parameter_changes += 1
         self.get_logger().info(f"parameters changed: {config.controller}, {config.supervisor}")
 
     def _on_enable(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:

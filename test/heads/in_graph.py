@@ -8,6 +8,7 @@ where it is: each trajectory is moved to the place and heading that it has by th
 from __future__ import annotations
 
 import argparse
+import itertools
 import math
 import sys
 import tempfile
@@ -25,7 +26,7 @@ from snake_control.control.reference import Reference
 from snake_control.nodes import topics
 from snake_control.nodes.conversions import pose_array, pose_message, reference_message, stamp_ns
 from support.head_action_client import HeadActionClient
-from support.head_trajectories import feasible, hostile
+from support.head_trajectories import HOSTILE_KINDS, KINDS, feasible, hostile
 from support.whole_graph import WholeGraph
 
 Array = NDArray[np.float64]
@@ -216,14 +217,14 @@ def _usual(w: Array) -> Array:
 def main(argv: Sequence[str] | None = None) -> int:
     """Run; return the exit code, 1 if the robot fell, left its limits, or was not done."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--feasible", type=int, default=10)
-    parser.add_argument("--hostile", type=int, default=12)
+    parser.add_argument("--feasible", type=int, default=2, help="so many of each kind")
+    parser.add_argument("--hostile", type=int, default=len(HOSTILE_KINDS))
     parser.add_argument("--out", type=Path, default=Path("out"))
     given = parser.parse_args(argv)
     of_robot, of_others = [], []
     with tempfile.TemporaryDirectory() as directory, WholeGraph(Path(directory)) as robot:
         campaign = Campaign(robot)
-        for number in range(given.feasible):
+        for number in shortest(given.feasible):
             of_robot.append(campaign.try_feasible(number))
             print(_line(of_robot[-1]), flush=True)
         for number in range(given.hostile):
@@ -236,6 +237,14 @@ def main(argv: Sequence[str] | None = None) -> int:
     (given.out / "heads_in_graph.md").write_text(text)
     print(f"written to {given.out / 'heads_in_graph.md'}")
     return 0 if all(holds(o) for o in (*of_robot, *of_others)) else 1
+
+
+def shortest(of_each_kind: int) -> list[int]:
+    """Return the numbers of the shortest feasible trajectories of each kind, shortest first."""
+    seconds = [one.duration for one in feasible()]
+    by_kind = (range(kind, len(seconds), len(KINDS)) for kind in range(len(KINDS)))
+    chosen = (sorted(kind, key=seconds.__getitem__)[:of_each_kind] for kind in by_kind)
+    return sorted(itertools.chain.from_iterable(chosen), key=seconds.__getitem__)
 
 
 def holds(outcome: Outcome) -> bool:

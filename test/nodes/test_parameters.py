@@ -56,6 +56,21 @@ def test_a_change_while_running_is_taken_and_the_weights_follow(running):
     assert running.get_parameter(NODE, "controller.b_prime") == 3.0
 
 
+def test_a_change_is_seen_in_the_state_and_a_refusal_is_not(running):
+    before = running.states.last
+    gains = [*before.k[:5], 0.3]
+    assert running.set_parameters(NODE, controller__K=gains)["controller__K"].successful
+    running.wait_for(lambda: list(running.states.last.k) == gains, 10.0, "the new gains")
+    assert running.states.last.parameter_changes == before.parameter_changes + 1
+    refused = running.set_parameters(NODE, controller__K=[-1.0] * 6)["controller__K"]
+    assert not refused.successful
+    assert "controller.K" in refused.reason
+    kept = running.set_parameters(NODE, controller__K=list(before.k))["controller__K"]
+    assert kept.successful
+    running.wait_for(lambda: list(running.states.last.k) == list(before.k), 10.0, "the old gains")
+    assert running.states.last.parameter_changes == before.parameter_changes + 2
+
+
 def test_a_weight_given_explicitly_survives_a_change_of_case(running):
     running.set_parameters(NODE, controller__case=3)
     # The very value that the case had set: explicit from now on.
