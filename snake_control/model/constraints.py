@@ -23,11 +23,11 @@ def lateral_map(g: PlanarBase) -> Array:
         base coordinates.
     """
     wheeled = g.s.wheeled
-    forward = g.forward[wheeled]
-    rows = np.empty((len(wheeled), 3))
-    rows[:, 0] = -forward.imag
-    rows[:, 1] = forward.real
-    rows[:, 2] = (forward.conj() * g.middles[wheeled]).real
+    forward = g.forward[..., wheeled]
+    rows = np.empty((*forward.shape, 3))
+    rows[..., 0] = -forward.imag
+    rows[..., 1] = forward.real
+    rows[..., 2] = (forward.conj() * g.middles[..., wheeled]).real
     return rows
 
 
@@ -42,13 +42,14 @@ def lateral_velocities(g: PlanarBase, base_velocities: Array) -> Array:
         ``lateral_joint_map`` times ``base_velocities``, (n_b - m_b,) [m/s].
     """
     s = g.s
-    turning = np.zeros(s.n_b)
-    np.add.accumulate(base_velocities, out=turning[1:])
+    turning = np.zeros(g.links.shape)
+    np.add.accumulate(base_velocities, axis=-1, out=turning[..., 1:])
     # A link that turns about its front end moves its rear end sideways.
-    front = np.zeros(s.n_b, dtype=complex)
-    np.add.accumulate(g.links[:-1] * (-1j * turning[:-1]), out=front[1:])
+    front = np.zeros(g.links.shape, dtype=complex)
+    moved = g.links[..., :-1] * (-1j * turning[..., :-1])
+    np.add.accumulate(moved, axis=-1, out=front[..., 1:])
     velocities: Array = (g.forward.conj() * front).imag - s.robot.half_length_m * turning
-    return velocities[s.wheeled]
+    return velocities[..., s.wheeled]
 
 
 def lateral_joint_map(g: PlanarBase) -> Array:

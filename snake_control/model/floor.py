@@ -12,7 +12,7 @@ from snake_control.model.geometry import Geometry
 from snake_control.model.head_chain import HeadChain, head_chain
 from snake_control.model.rotation import rpy_from_rotation, rpy_rates
 from snake_control.model.structure import structure
-from snake_control.model.vector import ZERO, Vector, along, cross, dot, through
+from snake_control.model.vector import ZERO, Twist, Vector, along, cross, dot, through
 
 Array = NDArray[np.float64]
 
@@ -84,15 +84,27 @@ def head_velocity(g: Geometry, base_rate: ArrayLike, phi_dot: ArrayLike) -> Arra
     """
     x_dot, y_dot, yaw_dot = np.asarray(base_rate, dtype=float).tolist()
     velocities = np.asarray(phi_dot, dtype=float)[: g.s.n_h].tolist()
-    # In base coordinates. Head joint i turns all in front of it backwards.
-    linear, angular = ZERO, along(ZERO, yaw_dot, g.rows[2])
-    for velocity, (by_origin, axis) in zip(velocities, g.chain.twists, strict=True):
-        linear = along(linear, -velocity, by_origin)
-        angular = along(angular, -velocity, axis)
-    linear = along(linear, 1.0, cross(angular, g.chain.tip))
+    turning = along(ZERO, yaw_dot, g.rows[2])
+    linear, angular = tip_twist(g.chain, (ZERO, turning), velocities)
     x, y, z = through(g.rows, linear)
     rates = rpy_rates(g.q[3:6], through(g.rows, angular))
     return np.array((x + x_dot, y + y_dot, z, *rates.tolist()))
+
+
+def tip_twist(chain: HeadChain, base: Twist, velocities: list[float]) -> Twist:
+    """Return linear velocity of the tip and angular velocity of the head, in base coordinates.
+
+    Args:
+        chain: the head part.
+        base: twist of the base frame at its origin, in base coordinates.
+        velocities: of the head joints, n_h numbers [rad/s].
+    """
+    linear, angular = base
+    # Head joint i turns all in front of it backwards.
+    for velocity, (by_origin, axis) in zip(velocities, chain.twists, strict=True):
+        linear = along(linear, -velocity, by_origin)
+        angular = along(angular, -velocity, axis)
+    return along(linear, 1.0, cross(angular, chain.tip)), angular
 
 
 def base_pose(g: Geometry) -> Array:

@@ -33,6 +33,9 @@ _LARGEST = 1e6
 class PlanarBase:
     """The base part in the frame of its first link; depends on the base joints alone.
 
+    Angles of shape (..., n_b - 1) make many of them at once, with those axes in front of all that
+    is said here; so take them ``lateral_map``, ``lateral_velocities`` and ``model.rolling``.
+
     Attributes:
         s: index sets of the robot.
         forward: direction of each base link, (n_b,), in the plane x + i y as the next three.
@@ -44,12 +47,13 @@ class PlanarBase:
     def __init__(self, s: Structure, base_angles: Array) -> None:
         """Work out the base part for the angles of joints n_h+1 .. n-1, (n_b - 1,) [rad]."""
         half = s.robot.half_length_m
-        heading = np.zeros(s.n_b)
-        np.add.accumulate(base_angles, out=heading[1:])
+        heading = np.zeros((*base_angles.shape[:-1], s.n_b))
+        np.add.accumulate(base_angles, axis=-1, out=heading[..., 1:])
         self.s = s
         self.forward = np.exp(1j * heading)
         self.links = self.forward * (2 * half)
-        self.fronts = self.links - np.add.accumulate(self.links)
+        behind: Plane = np.add.accumulate(self.links, axis=-1)
+        self.fronts = self.links - behind
         self.middles = self.fronts - self.links * 0.5
 
     @property

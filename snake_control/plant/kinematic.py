@@ -6,11 +6,9 @@ import math
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import lapack
 
 from snake_control.config import RobotConfig
 from snake_control.errors import ModelError
-from snake_control.model.constraints import lateral_map, lateral_velocities
 from snake_control.model.floor import (
     base_under_head,
     chain_pose_on_floor,
@@ -19,13 +17,12 @@ from snake_control.model.floor import (
 )
 from snake_control.model.geometry import Geometry, planar_base
 from snake_control.model.head_chain import head_chain
+from snake_control.model.rolling import rolling
 from snake_control.model.stability import support
 from snake_control.model.structure import structure
 from snake_control.plant.plant import PlantState
 
 Array = NDArray[np.float64]
-
-_FULL_RANK = 1e-6
 
 
 class KinematicPlant:
@@ -80,12 +77,9 @@ class KinematicPlant:
         """Return the rate of [x, y, yaw] of the base, and the slip of each wheeled link."""
         n_h = self._s.n_h
         links = planar_base(self._s, phi[n_h:])
-        rows = lateral_map(links)
-        by_joints = lateral_velocities(links, phi_dot[n_h:])
-        x, y, turn = _least_squares(rows, -by_joints)
+        (x, y, turn), slip = rolling(links, phi_dot[n_h:])
         c, si = math.cos(base[2]), math.sin(base[2])
-        rate = np.array((c * x - si * y, si * x + c * y, turn))
-        return rate, rows.dot((x, y, turn)) + by_joints
+        return np.array((c * x - si * y, si * x + c * y, turn)), slip
 
     def _state(self, planar: Array, phi_dot: Array, slip: Array) -> PlantState:
         chain = head_chain(self._s, self._phi[: self._s.n_h].tolist())
@@ -109,18 +103,3 @@ class KinematicPlant:
         if array.shape != (self._s.n - 1,) or not np.isfinite(array).all():
             raise ModelError(f"{what}: expected {self._s.n - 1} finite numbers, got {array}")
         return array
-
-
-def _least_squares(rows: Array, right: Array) -> tuple[float, float, float]:
-    """Solve for three numbers; of several answers (a singular shape) the smallest."""
-    if len(rows) > 3:
-        # The triangular factor of rows and right side together holds what is to be solved.
-        factor, _, _, _ = lapack.dgeqrf(np.concatenate((rows, right[:, None]), axis=1))
-        R = factor[:3].tolist()
-        diagonal = [abs(R[i][i]) for i in range(3)]
-        if min(diagonal) > _FULL_RANK * max(diagonal):
-            z = R[2][3] / R[2][2]
-            y = (R[1][3] - R[1][2] * z) / R[1][1]
-            return (R[0][3] - R[0][1] * y - R[0][2] * z) / R[0][0], y, z
-    x, y, z = np.linalg.lstsq(rows, right, rcond=1e-9)[0].tolist()
-    return x, y, z
