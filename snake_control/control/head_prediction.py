@@ -37,13 +37,15 @@ from snake_control.model.constraints import lateral_velocities
 from snake_control.model.floor import tip_twist
 from snake_control.model.geometry import planar_base
 from snake_control.model.head_chain import HeadChain, head_chain
-from snake_control.model.rolling import rolling, rolling_spread, rolling_steps
+from snake_control.model.rolling import point_spread, rolling, rolling_by_joint, rolling_steps
 from snake_control.model.structure import structure
 
 Array = NDArray[np.float64]
 
 _KEPT_NS = 2_000_000_000
 _MAX_SAMPLES = 1000
+_BOTH_ENDS = math.sqrt(2.0)
+"""Joints are misread at the beginning and at the end."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -156,7 +158,6 @@ class HeadPredictor:
         """Create it without a pose; the default limits for none given."""
         self._s = structure(robot)
         self._limits = PredictionLimits() if limits is None else limits
-        self._half = robot.half_length_m
         self._samples: list[_Joints] = []
         self._measured: HeadEstimate | None = None
         self._knots: list[_Knot] = []
@@ -325,13 +326,17 @@ class HeadPredictor:
 
         twist = self._twist(joints, chain, base)
         kept = math.exp(-dt / limits.smooth_s)
-        by_row, by_row_rad = _tip_spread(rolling_spread(middle), tip_in_base)
+        by_row, by_row_rad = point_spread(middle, chain.tip)
+        by_joint, by_joint_rad = rolling_by_joint(middle, chain.tip)
         pushed = lateral_velocities(middle, turned[n_h:])
         row = limits.slip_share * math.sqrt(float(pushed.dot(pushed)) / len(pushed))
         row += limits.creep_m_s * dt
-        # Misread base joints shift wheel rows; misread head joints, then and now, turn the head.
-        reading = limits.joint_std_rad * self._half
-        head_rad, head_m = self._misreading(chain)
+        # Misread base joints move the base; misread head joints the head on it.
+        head_m, head_rad = self._misreading(chain)
+        reading_m = (
+            _BOTH_ENDS * limits.joint_std_rad * math.hypot(math.sqrt(2.0) * by_joint, head_m)
+        )
+        reading_rad = _BOTH_ENDS * limits.joint_std_rad * math.hypot(by_joint_rad, head_rad)
         moved = _Knot(
             joints,
             origin,
@@ -339,10 +344,10 @@ class HeadPredictor:
             tip,
             twist + kept * (knot.twist - twist),
             knot.way_m + float(np.linalg.norm(tip - knot.tip)),
-            knot.position_growth_m + row * by_row,
+            knot.position_growth_m + row * math.sqrt(2.0) * by_row,
             knot.attitude_growth_rad + row * by_row_rad,
-            max(knot.reading_m, math.hypot(reading * by_row, head_m)),
-            max(knot.reading_rad, math.hypot(reading * by_row_rad, head_rad)),
+            max(knot.reading_m, reading_m),
+            max(knot.reading_rad, reading_rad),
         )
         position, attitude = self._std(moved)
         # Written so that it also ends what is not a number.
@@ -356,10 +361,9 @@ class HeadPredictor:
         return moved
 
     def _misreading(self, chain: HeadChain) -> tuple[float, float]:
-        """Return what misread head joints do to attitude [rad] and tip [m], at both ends."""
+        """Return what misreading each head joint by 1 rad does to tip [m] and attitude [rad]."""
         arms = sum(math.dist(chain.tip, pivot) ** 2 for pivot in chain.pivots)
-        both = math.sqrt(2.0) * self._limits.joint_std_rad
-        return both * math.sqrt(self._s.n_h), both * math.sqrt(arms)
+        return math.sqrt(arms), math.sqrt(self._s.n_h)
 
     def _std(self, knot: _Knot) -> tuple[float, float]:
         limits = self._limits
@@ -392,14 +396,3 @@ class HeadPredictor:
             position_std_m=position_std,
             attitude_std_rad=attitude_std,
         )
-
-
-def _tip_spread(spread: Array, tip: Array) -> tuple[float, float]:
-    """Return the standard deviations of tip [m] and heading [rad] for a spread of the base."""
-    if not np.isfinite(spread).all():
-        return math.inf, math.inf
-    to_tip = np.array(((1.0, 0.0, -tip[1]), (0.0, 1.0, tip[0])))
-    return (
-        math.sqrt(float(np.trace(to_tip @ spread @ to_tip.T))),
-        math.sqrt(float(spread[2, 2])),
-    )

@@ -6,12 +6,15 @@ disagree with them, least squares decide, and what remains is the slip of each w
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lapack
 
-from snake_control.model.constraints import lateral_map, lateral_velocities
+from snake_control.model.constraints import lateral_joint_map, lateral_map, lateral_velocities
 from snake_control.model.geometry import PlanarBase
+from snake_control.model.vector import Vector
 
 Array = NDArray[np.float64]
 Planar = tuple[float, float, float]
@@ -36,6 +39,41 @@ def rolling(g: PlanarBase, base_velocities: Array) -> tuple[Planar, Array]:
     by_joints = lateral_velocities(g, base_velocities)
     planar = _least_squares(rows, -by_joints)
     return planar, rows.dot(planar) + by_joints
+
+
+def rolling_by_joint(g: PlanarBase, point: Vector) -> tuple[float, float]:
+    """Return what turning each base joint by 1 rad does to the base, root of the sum of squares.
+
+    That is what misreading the joints does.
+
+    Args:
+        g: one base part.
+        point: of the base, in base coordinates [m].
+
+    Returns:
+        By how much the point moves, per horizontal axis (mean), and the base turns [m, rad];
+        infinite in a singular shape.
+    """
+    spread = rolling_spread(g)
+    if not np.isfinite(spread).all():
+        return math.inf, math.inf
+    by_joint = spread @ lateral_map(g).T @ lateral_joint_map(g)
+    moved = to_point(point) @ by_joint
+    return math.sqrt(0.5 * float((moved**2).sum())), math.sqrt(float((by_joint[2] ** 2).sum()))
+
+
+def to_point(point: Vector) -> Array:
+    """Return the velocity x, y of a point of the base per planar velocity, (2, 3)."""
+    return np.array(((1.0, 0.0, -point[1]), (0.0, 1.0, point[0])))
+
+
+def point_spread(g: PlanarBase, point: Vector) -> tuple[float, float]:
+    """Return what an error of 1 m in each wheel row does, as ``rolling_by_joint`` does."""
+    spread = rolling_spread(g)
+    if not np.isfinite(spread).all():
+        return math.inf, math.inf
+    at = to_point(point)
+    return math.sqrt(0.5 * float(np.trace(at @ spread @ at.T))), math.sqrt(float(spread[2, 2]))
 
 
 def rolling_spread(g: PlanarBase) -> Array:
