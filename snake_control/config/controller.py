@@ -50,6 +50,13 @@ class ControllerConfig:
         high=100.0,
         run_time=True,
     )
+    rotation_error: str = parameter(
+        "rpy",
+        "velocity control: error of the head's attitude, rpy as in (22), or rotation_vector, which "
+        "also works through P = +-90 degrees (docs/equations.md)",
+        choices=("rpy", "rotation_vector"),
+        run_time=True,
+    )
     K_p: tuple[float, ...] = parameter(
         (4.0,),
         "torque control (21): gain on the error of x_h, y_h, z_h, R, P, Y, or one for all [1/s^2]; "

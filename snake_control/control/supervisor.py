@@ -150,8 +150,8 @@ class Supervisor:
         fade = 1.0 - max(dangers.values(), default=0.0)
         away = self._escape.velocities(posture, dangers) if dangers else 0.0
 
-        back = self._law.feedback(error)
-        forward = self._law.feedforward(reference)
+        back = self._law.feedback(posture, error)
+        forward = self._law.feedforward(reference, error)
 
         resting_scps = self._law.sub_tasks(posture, self._still)
         sub_tasks = fade * self._sub_task_share(posture, resting_scps) * resting_scps

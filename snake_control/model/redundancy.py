@@ -17,7 +17,7 @@ from snake_control.model.head_block import HeadBlock
 from snake_control.model.lazy import lazy
 from snake_control.model.selection import selection
 from snake_control.model.structure import Structure
-from snake_control.model.vector import Twist, along, combine, cross
+from snake_control.model.vector import Rows, Twist, along, combine, cross
 
 Array = NDArray[np.float64]
 
@@ -31,12 +31,18 @@ class Kinematics:
 
     Attributes:
         s: index sets of the robot.
+        turning: axes, in base coordinates, about which components 3 to 5 of the head's velocity in
+            ``joint_velocities`` turn the robot: those of R, P, Y (so that it is w_dot), or the
+            rows of the base's attitude, the world's axes (so that it is a twist). The matrices
+            are always the paper's.
     """
 
     s: Structure
+    turning: Rows
 
     def __init__(self, g: Geometry) -> None:
         self.s = g.s
+        self.turning = g.attitude_axes
         self._g = g
 
     @lazy
@@ -146,9 +152,14 @@ class Kinematics:
         return F_bar
 
     def joint_velocities(self, w_dot: list[float], phi_tilde_dot: list[float]) -> Array:
-        """Return u of (22), see the function of that name, without forming F_bar."""
+        """Return u of (22), see the function of that name, without forming F_bar.
+
+        Args:
+            w_dot: velocity of the head, of what is controlled; see ``turning`` for its rotation.
+            phi_tilde_dot: wanted SCP velocities, H-SCPs first, m numbers [rad/s].
+        """
         s, g = self.s, self._g
-        motion = _motion_by_w(g, w_dot)
+        motion = _motion_by_w(g, w_dot, self.turning)
         (forward, sideways, _), (_, _, turning) = motion
         velocities = [0.0] * s.n_h
         if s.n_h:
@@ -222,7 +233,7 @@ def joint_velocities(k: Kinematics, w_dot: Array, phi_tilde_dot: Array) -> Array
     return k.joint_velocities(np.asarray(w_dot).tolist(), np.asarray(phi_tilde_dot).tolist())
 
 
-def _motion_by_w(g: Geometry, w_dot: list[float]) -> Twist:
+def _motion_by_w(g: Geometry, w_dot: list[float], turning: Rows) -> Twist:
     """Return how the base frame moves with the head pose while the head joints rest."""
     if g.s.robot.planar:
         x_dot, y_dot, yaw_dot = w_dot
@@ -230,7 +241,7 @@ def _motion_by_w(g: Geometry, w_dot: list[float]) -> Twist:
     else:
         x_dot, y_dot, z_dot, roll_dot, pitch_dot, yaw_dot = w_dot
     a, b, c = g.rows
-    rolling, pitching, yawing = g.attitude_axes
+    rolling, pitching, yawing = turning
     angular = along(combine(roll_dot, rolling, pitch_dot, pitching), yaw_dot, yawing)
     linear = along(combine(x_dot, a, y_dot, b), z_dot, c)
     return along(linear, 1.0, cross(g.chain.tip, angular)), angular

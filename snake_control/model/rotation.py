@@ -87,6 +87,36 @@ def rpy_from_quaternion(quaternion: ArrayLike) -> Array:
     return rpy_from_rotation(Rotation.from_quat(np.asarray(quaternion, dtype=float)).as_matrix())
 
 
+def rotation_vector(rotation: ArrayLike) -> Array:
+    """Return the rotation vector of a rotation matrix, (3,), its length in [0, pi] [rad]."""
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = np.asarray(rotation, dtype=float).tolist()
+    twice_sine = np.array([zy - yz, xz - zx, yx - xy])
+    length = math.hypot(*twice_sine.tolist())
+    twice_cosine = xx + yy + zz - 1.0
+    if length < 1e-4 and twice_cosine < 0.0:
+        # Near half a turn the sine has lost the axis.
+        return Rotation.from_matrix(rotation).as_rotvec()
+    angle = math.atan2(length, twice_cosine)
+    # The angle over its sine is 1 + angle^2 / 6 at first.
+    return twice_sine * (angle / length if length > 1e-8 else 0.5)
+
+
+def rotation_from_vector(vector: ArrayLike) -> Array:
+    """Return the rotation matrix of a rotation vector [rad], (3, 3)."""
+    x, y, z = (float(component) for component in np.asarray(vector, dtype=float))
+    angle = math.hypot(x, y, z)
+    a = math.sin(angle) / angle if angle > 1e-8 else 1.0
+    half = math.sin(0.5 * angle) / angle if angle > 1e-8 else 0.5
+    b = 2.0 * half * half
+    return np.array(
+        [
+            [1.0 - b * (y * y + z * z), b * x * y - a * z, b * x * z + a * y],
+            [b * x * y + a * z, 1.0 - b * (x * x + z * z), b * y * z - a * x],
+            [b * x * z - a * y, b * y * z + a * x, 1.0 - b * (x * x + y * y)],
+        ]
+    )
+
+
 def wrap(angle: ArrayLike) -> Array:
     """Return angles in [-pi, pi), elementwise [rad]."""
     return np.mod(np.asarray(angle, dtype=float) + math.pi, 2 * math.pi) - math.pi

@@ -88,7 +88,7 @@ def test_the_reference_is_slowed_before_the_correction_of_the_error(
     law = ScpController(config.robot, config.controller)
     posture, error = law.look(start, quick)
     scps = law.sub_tasks(posture, [0.0] * 6)
-    w_dot = np.array(law.feedback(error)) + result.speed_scale * quick.w_d_dot
+    w_dot = np.array(law.feedback(posture, error)) + result.speed_scale * quick.w_d_dot
     expected = posture.k.joint_velocities(w_dot.tolist(), scps.tolist())
     np.testing.assert_allclose(result.u, expected, rtol=1e-6, atol=1e-9)
 
