@@ -97,7 +97,7 @@ class WatchLimits:
     clear: int = 6
     least_offset_m: float = 0.005
     offset_gain: float = 30.0
-    beside_offset: float = 2.0
+    beside_offset: float = 1.0
     offset_seen: float = 0.08
 
 
