@@ -11,6 +11,7 @@ DURATION ?= 60
 SEED ?= 1
 SCENARIO ?=
 GRAPH ?=
+RECORD ?=
 PACKETS ?= 1000000
 PYTHON ?=
 export PYTHON
@@ -21,6 +22,7 @@ help:
 	@printf '%s\n' \
 	  'make demo    the paper'"'"'s experiment on a mock robot through real ROS 2 messages; results in out/demo' \
 	  '             CASE=1|2|3 (default 3)  DURATION=seconds (default 60)  SEED=n (default 1)' \
+	  '             RECORD=1 for a recording of all topics too, out/demo/demo.mcap (docs/see_it.md)' \
 	  'make test    lint, then all tests' \
 	  'make lint    style, types and the import rules' \
 	  'make bench   time control step, dynamics and lockstep; results in out/bench.json' \
@@ -65,7 +67,7 @@ build: build/ready
 
 demo: build/ready
 	@. scripts/env.sh && exec python -m snake_control.cli.demo \
-	  --case $(CASE) --duration $(DURATION) --seed $(SEED) --out out/demo
+	  --case $(CASE) --duration $(DURATION) --seed $(SEED) --out out/demo $(if $(filter-out 0,$(RECORD)),--record)
 
 test: lint build/ready
 	@exec bash scripts/test.sh

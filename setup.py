@@ -11,6 +11,7 @@ NODES = (
     "scp_controller",
     "trajectory_generator",
     "keyboard_teleop",
+    "record",
     "mock_bus",
 )
 COMMANDS = ("demo", "evaluate", "experiment", "scp_study")

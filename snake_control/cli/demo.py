@@ -40,7 +40,14 @@ from snake_control.experiment.table import format_summary
 from snake_control.nodes.recorder import FOLLOWING, STATUS_WORDS, Recorder
 from snake_control.nodes.topics import ENABLE, START, STOP, Service
 
-_STOP_ORDER = ("scp_controller", "trajectory_generator", "pose_input", "bus_driver", "mock_bus")
+_STOP_ORDER = (
+    "scp_controller",
+    "trajectory_generator",
+    "pose_input",
+    "bus_driver",
+    "mock_bus",
+    "record",
+)
 _READY_TIMEOUT_S = 40.0
 _SILENCE_TIMEOUT_S = 5.0
 _SERVICE_TIMEOUT_S = 3.0
@@ -133,7 +140,8 @@ class Demo:
     def _start_nodes(self) -> None:
         self._progress.say("starting the nodes")
         # The processes are forked before rclpy has threads; the driver needs the mock's port.
-        for kind in ("mock_bus", "pose_input", "scp_controller", "trajectory_generator"):
+        first = ("record",) if self._arguments.record else ()
+        for kind in (*first, "mock_bus", "pose_input", "scp_controller", "trajectory_generator"):
             self._start(kind)
         deadline = time.monotonic() + _READY_TIMEOUT_S
         while not self._port.exists():
@@ -166,6 +174,8 @@ class Demo:
             single["port"] = self._port
         if kind == "mock_bus":
             single |= self._arguments.mock_parameters
+        if kind == "record":
+            single["file"] = self._arguments.recording
         for name, value in single.items():
             # With the node's name: to rcl a file's section of this node outranks a bare -p.
             given += ["-p", f"{kind}:{name}:={value}"]
@@ -367,7 +377,9 @@ def _write_results(arguments: DemoArguments, config: Config, demo: Demo, outcome
     for finding in demo.stop_findings:
         print(f"while stopping: {finding}", file=sys.stderr)
     print(f"\n{format_summary(summary)}\n")
-    for path in (arguments.out / "summary.json", arguments.out / "series.csv", *figures):
+    recordings = (arguments.recording,) if arguments.record else ()
+    tables = (arguments.out / "summary.json", arguments.out / "series.csv")
+    for path in (*tables, *recordings, *figures):
         print(path)
     print(f"{arguments.out / 'logs'}{os.sep}")
 

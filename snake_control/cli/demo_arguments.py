@@ -26,6 +26,7 @@ class DemoArguments:
         out: directory of the results.
         params_files: the user's files, read last.
         no_noise: whether the motion capture is exact (its delay stays).
+        record: whether every topic is recorded to ``recording``.
     """
 
     case: int
@@ -34,6 +35,12 @@ class DemoArguments:
     out: Path
     params_files: tuple[Path, ...]
     no_noise: bool
+    record: bool = False
+
+    @property
+    def recording(self) -> Path:
+        """The file that ``record`` makes."""
+        return self.out / "demo.mcap"
 
     @property
     def all_params_files(self) -> tuple[Path, ...]:
@@ -72,7 +79,13 @@ class DemoArguments:
             OSError: it cannot be made or cleared.
         """
         (self.out / "logs").mkdir(parents=True, exist_ok=True)
-        for pattern in ("fig[01][0-9]_*.png", "summary.json", "series.csv", "logs/*.log"):
+        for pattern in (
+            "fig[01][0-9]_*.png",
+            "summary.json",
+            "series.csv",
+            "demo.mcap",
+            "logs/*.log",
+        ):
             for path in self.out.glob(pattern):
                 path.unlink()
 
@@ -110,6 +123,9 @@ def parse_arguments(argv: Sequence[str] | None = None) -> DemoArguments:
     parser.add_argument(
         "--no-noise", action="store_true", help="motion capture without noise (delay stays)"
     )
+    parser.add_argument(
+        "--record", action="store_true", help="write every topic to demo.mcap beside the results"
+    )
     given = parser.parse_args(argv)
     return DemoArguments(
         case=given.case,
@@ -118,4 +134,5 @@ def parse_arguments(argv: Sequence[str] | None = None) -> DemoArguments:
         out=given.out,
         params_files=tuple(given.params_file),
         no_noise=given.no_noise,
+        record=given.record,
     )

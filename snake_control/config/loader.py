@@ -14,6 +14,7 @@ from snake_control.config.nodes import (
     KeyboardTeleopConfig,
     MockBusConfig,
     PoseInputConfig,
+    RecordConfig,
     ScpControllerConfig,
     TrajectoryGeneratorConfig,
 )
@@ -35,6 +36,7 @@ _NODE_GROUPS: dict[str, type] = {
     "scp_controller": ScpControllerConfig,
     "trajectory_generator": TrajectoryGeneratorConfig,
     "keyboard_teleop": KeyboardTeleopConfig,
+    "record": RecordConfig,
     "mock_bus": MockBusConfig,
 }
 _SHARED_GROUPS_OF_NODE: dict[str, tuple[str, ...]] = {
@@ -43,6 +45,7 @@ _SHARED_GROUPS_OF_NODE: dict[str, tuple[str, ...]] = {
     "scp_controller": ("robot", "controller", "supervisor"),
     "trajectory_generator": ("robot", "controller", "supervisor"),
     "keyboard_teleop": (),
+    "record": (),
     "mock_bus": ("robot", "servos"),
 }
 # Parameters that rclpy itself declares in every node.
@@ -63,6 +66,7 @@ class Config:
     scp_controller: ScpControllerConfig
     trajectory_generator: TrajectoryGeneratorConfig
     keyboard_teleop: KeyboardTeleopConfig
+    record: RecordConfig
     mock_bus: MockBusConfig
 
 

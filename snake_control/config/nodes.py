@@ -309,6 +309,21 @@ class KeyboardTeleopConfig:
 
 
 @dataclasses.dataclass(frozen=True)
+class RecordConfig:
+    """Parameters of the node ``record``."""
+
+    file: str = parameter(
+        "", "MCAP file to make; empty: snake_DATE_TIME.mcap in the current directory"
+    )
+    flush_period_s: float = parameter(
+        1.0, "how much the file lacks at most when this process is killed [s]", low=0.05, high=60.0
+    )
+    queue: int = parameter(
+        1000, "messages of each topic that may wait until they are written", low=1, high=100000
+    )
+
+
+@dataclasses.dataclass(frozen=True)
 class MockBusConfig:
     """Parameters of the node ``mock_bus``: simulated servos, floor and motion capture."""
 

@@ -11,6 +11,7 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped, Twist, TwistStamped
 from nav_msgs.msg import Odometry, Path
+from rcl_interfaces.msg import Log
 from rclpy.qos import (
     DurabilityPolicy,
     HistoryPolicy,
@@ -107,6 +108,17 @@ CONTROLLER_STATE = Topic("controller_state", ControllerState, _STATE)
 MARKERS = Topic("markers", MarkerArray, _COMMAND)
 
 PLANT_STATE = Topic("ground_truth/plant_state", PlantState, _STATE)
+
+# ROS's own: what the nodes log.
+ROSOUT = Topic("/rosout", Log, _reliable(1000, DurabilityPolicy.TRANSIENT_LOCAL))
+
+_OWNERS = {EMERGENCY_STOP_ACTIVE.name: "bus_driver"}
+ALL = tuple(
+    topic.of(_OWNERS[topic.name]) if topic.name.startswith("~") else topic
+    for topic in tuple(globals().values())
+    if isinstance(topic, Topic)
+)
+"""Every topic of one robot as others name it, for recordings; one name may have several types."""
 
 SET_TORQUE = Service("~/set_torque", SetBool)
 RECOVER = Service("~/recover", Trigger)

@@ -14,8 +14,10 @@ import pytest
 from snake_control.cli.demo_outcome import Outcome, RunJudge
 from snake_control.config import RobotConfig
 from snake_control.experiment.series import Series
+from snake_control.nodes.recorder import FOLLOWING
 from support.graph import Graph
 from support.process import Process
+from support.recordings import read
 from support.waiting import wait_for
 
 ROOT = Path(__file__).parents[2]
@@ -258,10 +260,10 @@ def test_fall_is_reported_and_is_no_success(start, tmp_path):
 
 
 def test_ctrl_c_stops_the_nodes_in_order_and_writes_results(start):
-    demo = start("--duration", "60", "--case", "1")
+    demo = start("--duration", "60", "--case", "1", "--record")
     demo.wait_for_rows(60)
     nodes = demo.node_pids()
-    assert set(nodes) == NODES
+    assert set(nodes) == NODES | {"record"}
     demo.process.interrupt()
     assert demo.process.wait(60.0) == 130, demo.process.report()
 
@@ -269,6 +271,15 @@ def test_ctrl_c_stops_the_nodes_in_order_and_writes_results(start):
     assert demo.summary["stop_findings"] == []
     assert demo.summary["control"]["steps"] >= 60
     assert (demo.out / "fig08_head_pose.png").exists()
+    recording = read(demo.out / "demo.mcap")
+    name = f"/demo_{demo.process.pid}/controller_state"
+    steps = [entry.decoded for entry in recording if entry.channel.topic == name]
+    first = next(i for i, state in enumerate(steps) if state.status in FOLLOWING)
+    series = Series.read(demo.out / "series.csv", RobotConfig())
+    # The recorder goes on while the nodes are stopped; the table has fewer digits.
+    recorded = [state.w[0] for state in steps[first : first + len(series)]]
+    assert recorded == pytest.approx(series.numbers("w_measured")[:, 0].tolist(), abs=1e-6)
+    assert "none lost" in (demo.out / "logs" / "record.log").read_text()
     assert [kind for kind, pid in nodes.items() if not _ended(pid)] == []
 
 

@@ -16,6 +16,7 @@ NODES = {
     "scp_controller",
     "trajectory_generator",
     "keyboard_teleop",
+    "record",
     "mock_bus",
 }
 COMMANDS = {"ax12", "demo", "evaluate", "experiment", "scp_study"}

@@ -78,6 +78,14 @@ class Process:
         """Send SIGKILL: it gets no chance to clean up."""
         self._send(signal.SIGKILL)
 
+    def pause(self) -> None:
+        """Send SIGSTOP: it does nothing until ``resume``."""
+        self._send(signal.SIGSTOP)
+
+    def resume(self) -> None:
+        """Send SIGCONT."""
+        self._send(signal.SIGCONT)
+
     def wait(self, timeout: float = 10.0) -> int:
         """Wait until it has ended and return its exit code.
 
