@@ -11,6 +11,7 @@ NODES = (
     "scp_controller",
     "trajectory_generator",
     "keyboard_teleop",
+    "description",
     "record",
     "mock_bus",
 )

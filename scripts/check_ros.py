@@ -9,6 +9,7 @@ import sys
 NEEDED = {
     "rclpy": "ros-jazzy-rclpy",
     "std_srvs": "ros-jazzy-std-srvs",
+    "tf2_msgs": "ros-jazzy-tf2-msgs",
     "geometry_msgs": "ros-jazzy-geometry-msgs",
     "sensor_msgs": "ros-jazzy-sensor-msgs",
     "nav_msgs": "ros-jazzy-nav-msgs",

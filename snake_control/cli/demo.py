@@ -46,6 +46,7 @@ _STOP_ORDER = (
     "pose_input",
     "bus_driver",
     "mock_bus",
+    "description",
     "record",
 )
 _READY_TIMEOUT_S = 40.0
@@ -140,7 +141,7 @@ class Demo:
     def _start_nodes(self) -> None:
         self._progress.say("starting the nodes")
         # The processes are forked before rclpy has threads; the driver needs the mock's port.
-        first = ("record",) if self._arguments.record else ()
+        first = ("record", "description") if self._arguments.record else ()
         for kind in (*first, "mock_bus", "pose_input", "scp_controller", "trajectory_generator"):
             self._start(kind)
         deadline = time.monotonic() + _READY_TIMEOUT_S

@@ -11,6 +11,7 @@ from typing import Any
 from snake_control.config.controller import ControllerConfig
 from snake_control.config.nodes import (
     BusDriverConfig,
+    DescriptionConfig,
     KeyboardTeleopConfig,
     MockBusConfig,
     PoseInputConfig,
@@ -36,6 +37,7 @@ _NODE_GROUPS: dict[str, type] = {
     "scp_controller": ScpControllerConfig,
     "trajectory_generator": TrajectoryGeneratorConfig,
     "keyboard_teleop": KeyboardTeleopConfig,
+    "description": DescriptionConfig,
     "record": RecordConfig,
     "mock_bus": MockBusConfig,
 }
@@ -45,6 +47,7 @@ _SHARED_GROUPS_OF_NODE: dict[str, tuple[str, ...]] = {
     "scp_controller": ("robot", "controller", "supervisor"),
     "trajectory_generator": ("robot", "controller", "supervisor"),
     "keyboard_teleop": (),
+    "description": ("robot",),
     "record": (),
     "mock_bus": ("robot", "servos"),
 }
@@ -66,6 +69,7 @@ class Config:
     scp_controller: ScpControllerConfig
     trajectory_generator: TrajectoryGeneratorConfig
     keyboard_teleop: KeyboardTeleopConfig
+    description: DescriptionConfig
     record: RecordConfig
     mock_bus: MockBusConfig
 

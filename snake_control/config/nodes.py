@@ -309,6 +309,21 @@ class KeyboardTeleopConfig:
 
 
 @dataclasses.dataclass(frozen=True)
+class DescriptionConfig:
+    """Parameters of the node ``description``."""
+
+    frame_id: str = parameter("world", "frame in which head/odometry gives the head's pose")
+    frame_prefix: str = parameter(
+        "", "put before link_1 .. link_n, so that several robots have frames of their own"
+    )
+    transforms: str = parameter(
+        "all",
+        "what goes to /tf: all; head (world to link_1 alone, beside robot_state_publisher); none",
+        choices=("all", "head", "none"),
+    )
+
+
+@dataclasses.dataclass(frozen=True)
 class RecordConfig:
     """Parameters of the node ``record``."""
 

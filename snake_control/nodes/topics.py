@@ -30,9 +30,15 @@ from snake_interfaces.msg import (
     PoseStatus,
 )
 from snake_interfaces.srv import InjectFault
-from std_msgs.msg import Bool
+from std_msgs.msg import Bool, String
 from std_srvs.srv import SetBool, Trigger
 from visualization_msgs.msg import MarkerArray
+
+try:
+    from tf2_msgs.msg import TFMessage
+except ImportError:
+    # Part of every installed ROS, but not of the wheels.
+    TFMessage = None
 
 
 @dataclasses.dataclass(frozen=True)
@@ -109,6 +115,9 @@ MARKERS = Topic("markers", MarkerArray, _COMMAND)
 
 PLANT_STATE = Topic("ground_truth/plant_state", PlantState, _STATE)
 
+ROBOT_DESCRIPTION = Topic("robot_description", String, _LATCHED)
+# Absolute, as tf2's listeners have it: frames of several robots differ by their prefix.
+TF = None if TFMessage is None else Topic("/tf", TFMessage, _reliable(100))
 # ROS's own: what the nodes log.
 ROSOUT = Topic("/rosout", Log, _reliable(1000, DurabilityPolicy.TRANSIENT_LOCAL))
 

@@ -263,7 +263,7 @@ def test_ctrl_c_stops_the_nodes_in_order_and_writes_results(start):
     demo = start("--duration", "60", "--case", "1", "--record")
     demo.wait_for_rows(60)
     nodes = demo.node_pids()
-    assert set(nodes) == NODES | {"record"}
+    assert set(nodes) == NODES | {"description", "record"}
     demo.process.interrupt()
     assert demo.process.wait(60.0) == 130, demo.process.report()
 

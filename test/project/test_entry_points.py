@@ -16,6 +16,7 @@ NODES = {
     "scp_controller",
     "trajectory_generator",
     "keyboard_teleop",
+    "description",
     "record",
     "mock_bus",
 }
