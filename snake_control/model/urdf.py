@@ -28,6 +28,11 @@ def link_box_m(robot: RobotConfig) -> tuple[float, float, float]:
     return 2 * robot.half_length_m, width, height
 
 
+def wheel_size_m(robot: RobotConfig) -> tuple[float, float]:
+    """Return radius and width of a wheel as it is drawn [m]."""
+    return robot.wheel_radius_m, _WHEEL_WIDTH_OVER_RADIUS * robot.wheel_radius_m
+
+
 def link_inertias(robot: RobotConfig) -> Array:
     """Return the moments of inertia of every link, a uniform box, about its centre.
 
@@ -71,11 +76,9 @@ def _add_link(root: ElementTree.Element, robot: RobotConfig, number: int, moment
     part = "head" if number <= robot.head_links else "base"
     _add_visual(link, box, (center, 0.0, 0.0), 0.0, part)
     if number in robot.wheeled_links and robot.wheel_radius_m > 0:
-        radius = robot.wheel_radius_m
+        radius, width = wheel_size_m(robot)
         for side in (robot.wheel_offset_m, -robot.wheel_offset_m):
-            wheel = ElementTree.Element(
-                "cylinder", radius=_text(radius), length=_text(_WHEEL_WIDTH_OVER_RADIUS * radius)
-            )
+            wheel = ElementTree.Element("cylinder", radius=_text(radius), length=_text(width))
             # A cylinder's axis is z; a wheel's is y.
             _add_visual(link, wheel, (center, side, 0.0), math.pi / 2, "wheel")
 

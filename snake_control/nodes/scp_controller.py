@@ -7,7 +7,6 @@ Stamps are judged by ROS time; timers run on a steady clock, also under ``use_si
 
 from __future__ import annotations
 
-import contextlib
 import time
 from typing import Any
 
@@ -23,10 +22,11 @@ from snake_control.config import Config
 from snake_control.control.reference import Reference
 from snake_control.control.supervisor import NO_ANSWER, Supervisor
 from snake_control.model.rotation import unwrap_near
-from snake_control.nodes import markers, topics
+from snake_control.nodes import topics
 from snake_control.nodes.controller_messages import ControllerMessages, Step, judge, too_far
 from snake_control.nodes.conversions import head_motion, joint_motion, reference_from
 from snake_control.nodes.inputs import Fault, Input, Problem
+from snake_control.nodes.markers import RobotMarkers
 from snake_control.nodes.parameters import NodeParameters
 from snake_control.nodes.process import run
 
@@ -76,6 +76,8 @@ class ScpControllerNode(Node):
         self._bus: tuple[int, BusState] | None = None
         self._stopped = ""
         self._messages = ControllerMessages(config.robot, own.frame_id)
+        self._drawn = RobotMarkers(config.robot, own.frame_id)
+        self._latest = Step.at(0, config.robot)
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._origin_ns = self._steady.now().nanoseconds
         # Roll, pitch and yaw go on without jumps by whole turns.
@@ -148,6 +150,7 @@ class ScpControllerNode(Node):
             self._command.publish(self._messages.command(step))
             state = self._messages.state(step, self._gains, elapsed)
         self._state.publish(state)
+        self._latest = step
         if step.result is None:
             self._controller.rest()
         if step.status != self._status:
@@ -265,18 +268,12 @@ class ScpControllerNode(Node):
         if self._markers.get_subscription_count() == 0:
             return
         now = self.get_clock().now().nanoseconds
-        frame = self._own.frame_id
-        found = []
+        q = w_d = None
         if not self._head.problem(now) and not self._joint_states.problem(now):
             q = np.concatenate([self._head.value[0], self._joint_states.value[0]])
-            # A posture that the step refuses, and says so, cannot be drawn either.
-            with contextlib.suppress(*NO_ANSWER):
-                found += markers.robot_markers(self._robot, q, now, frame)
         if not self._reference.problem(now):
-            length = 4 * self._robot.half_length_m
-            found.append(markers.reference_marker(self._reference.value.w_d, now, frame, length))
-        if found:
-            self._markers.publish(markers.marker_array(found))
+            w_d = self._reference.value.w_d
+        self._markers.publish(self._drawn.draw(now, q, w_d, self._latest))
 
     def close(self) -> None:
         """Leave the joints with a command to rest."""

@@ -265,16 +265,15 @@ def test_commands_come_at_the_configured_rate(rig):
 def test_markers_show_robot_and_reference(rig):
     markers = rig.graph.subscribe(topics.MARKERS)
     rig.graph.wait_for(lambda: markers.last, 10.0, "markers")
-    found = {marker.ns: marker for marker in markers.last.markers}
-    assert set(found) == {"links", "wheels", "support_polygon", "P_G", "reference"}
-    robot = rig.config.robot
-    assert len(found["links"].points) == robot.links + 1
-    assert len(found["wheels"].points) == 2 * len(robot.wheeled_links)
-    tip = found["links"].points[0]
+    found = {(marker.ns, marker.id): marker for marker in markers.last.markers}
+    tip = found["head_axis", 0].points[0]
     np.testing.assert_allclose([tip.x, tip.y, tip.z], rig.w[:3], atol=1e-9)
-    target = found["reference"].points[1]
+    target = found["reference", 0].points[1]
     np.testing.assert_allclose([target.x, target.y, target.z], rig.table_1.w_d[:3], atol=1e-9)
-    assert all(marker.header.frame_id == "world" for marker in found.values())
+    assert {ns for ns, _ in found} >= {"links", "wheels", "support_polygon", "P_G", "status"}
+    state = rig.states.last
+    assert found["status", 0].text.endswith(f"\nd_min {1e3 * state.d_min:.1f} mm")
+    assert {marker.header.frame_id for marker in found.values()} == {"world"}
 
 
 def test_a_head_out_of_this_world_is_not_drawn(rig):
@@ -282,7 +281,7 @@ def test_a_head_out_of_this_world_is_not_drawn(rig):
     rig.head.pose.pose.position.x = 1e300
     rig.wait_status(ControllerState.STATUS_ERROR_TOO_LARGE, what="the far head noticed")
     rig.graph.wait_for(
-        lambda: markers.last and [marker.ns for marker in markers.last.markers] == ["reference"],
+        lambda: markers.last and [m.ns for m in markers.last.markers] == ["reference", "status"],
         10.0,
         "markers without the robot",
     )
