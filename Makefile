@@ -54,7 +54,7 @@ endif
 
 INTERFACES := $(wildcard snake_interfaces/*.* snake_interfaces/*/*)
 PACKAGE := package.xml setup.py setup.cfg colcon_defaults.yaml \
-           $(wildcard config/*.yaml launch/*.py resource/*) \
+           $(wildcard config/*.yaml config/*.rviz config/layouts/* launch/*.py resource/*) \
            $(shell find snake_control -name '*.py')
 
 build/ready: .venv/ready $(INTERFACES) $(PACKAGE)

@@ -176,7 +176,7 @@ class Demo:
         if kind == "mock_bus":
             single |= self._arguments.mock_parameters
         if kind == "record":
-            single["file"] = self._arguments.recording
+            single |= {"file": self._arguments.recording, "strip_namespace": "true"}
         for name, value in single.items():
             # With the node's name: to rcl a file's section of this node outranks a bare -p.
             given += ["-p", f"{kind}:{name}:={value}"]

@@ -330,6 +330,9 @@ class RecordConfig:
     file: str = parameter(
         "", "MCAP file to make; empty: snake_DATE_TIME.mcap in the current directory"
     )
+    strip_namespace: bool = parameter(
+        False, "write the robot's topics without its namespace, as the layouts name them"
+    )
     flush_period_s: float = parameter(
         1.0, "how much the file lacks at most when this process is killed [s]", low=0.05, high=60.0
     )

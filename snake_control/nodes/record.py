@@ -149,6 +149,9 @@ class Record(Node):
         if offered:
             metadata["topic_type_hash"] = str(offered[0].topic_type_hash)
         type_ = type_name(message_type)
+        own = f"{self.get_namespace().rstrip('/')}/"
+        if self._own.strip_namespace and name.startswith(own):
+            name = f"/{name.removeprefix(own)}"
         return self._file.add_topic(name, type_, definition(type_), metadata)
 
     def _follow(self, name: str, heard: _Heard, sequence: int) -> None:

@@ -272,7 +272,8 @@ def test_ctrl_c_stops_the_nodes_in_order_and_writes_results(start):
     assert demo.summary["control"]["steps"] >= 60
     assert (demo.out / "fig08_head_pose.png").exists()
     recording = read(demo.out / "demo.mcap")
-    name = f"/demo_{demo.process.pid}/controller_state"
+    # Under the names that the layouts have.
+    name = "/controller_state"
     steps = [entry.decoded for entry in recording if entry.channel.topic == name]
     first = next(i for i, state in enumerate(steps) if state.status in FOLLOWING)
     series = Series.read(demo.out / "series.csv", RobotConfig())
