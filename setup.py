@@ -15,7 +15,7 @@ NODES = (
     "record",
     "mock_bus",
 )
-COMMANDS = ("demo", "evaluate", "experiment", "scp_study")
+COMMANDS = ("demo", "evaluate", "experiment", "layouts", "scp_study")
 
 setup(
     name=NAME,

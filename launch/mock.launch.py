@@ -1,25 +1,36 @@
-"""The robot without hardware: mock servos, mock motion capture and the four nodes.
+"""The robot without hardware: mock servos, mock motion capture and the nodes.
 
 ros2 launch snake_control mock.launch.py case:=3
 ros2 service call /trajectory_generator/start std_srvs/srv/Trigger
+
+Several at once, each in its namespace: namespace:=robot_1. record:=run.mcap records all topics.
 """
 
 from collections.abc import Callable
 from pathlib import Path
 
 from ament_index_python.packages import get_package_share_directory
-from launch import LaunchDescription
-from launch.actions import DeclareLaunchArgument, RegisterEventHandler
+from launch import LaunchContext, LaunchDescription, LaunchDescriptionEntity
+from launch.actions import DeclareLaunchArgument, OpaqueFunction, RegisterEventHandler
 from launch.event_handlers import OnProcessIO
 from launch.events.process import ProcessIO
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterFile
 
+from snake_control.config.namespaces import robot_parameters
+
 # What the mock says when its port is there.
 READY = "servos at"
 
-NODES = ("mock_bus", "bus_driver", "pose_input", "scp_controller", "trajectory_generator")
+NODES = (
+    "mock_bus",
+    "bus_driver",
+    "pose_input",
+    "scp_controller",
+    "trajectory_generator",
+    "description",
+)
 
 
 def once_ready(action: Node) -> Callable[[ProcessIO], Node | None]:
@@ -36,26 +47,37 @@ def once_ready(action: Node) -> Callable[[ProcessIO], Node | None]:
     return on_output
 
 
-def generate_launch_description() -> LaunchDescription:
-    """Describe the mock's graph."""
+def nodes(context: LaunchContext) -> list[LaunchDescriptionEntity]:
+    """Return the nodes; the driver starts when the mock's port is there."""
     config = Path(get_package_share_directory("snake_control"), "config")
-    parameters = [
+    namespace = LaunchConfiguration("namespace").perform(context)
+    record = LaunchConfiguration("record").perform(context)
+    own: dict[str, dict[str, str]] = robot_parameters(namespace)
+    own["record"] = {"file": record}
+    files = [
         ParameterFile(LaunchConfiguration("params_file")),
         ParameterFile(str(config / "mock.yaml")),
         ParameterFile([str(config / "case_"), LaunchConfiguration("case"), ".yaml"]),
     ]
-    nodes = {
+    started = {
         name: Node(
             package="snake_control",
             executable=name,
             name=name,
-            namespace=LaunchConfiguration("namespace"),
-            parameters=parameters,
+            namespace=namespace,
+            parameters=[*files, *([own[name]] if name in own else [])],
             output="screen",
         )
-        for name in NODES
+        for name in (*NODES, *(("record",) if record else ()))
     }
-    driver = nodes.pop("bus_driver")
+    driver = started.pop("bus_driver")
+    ready = OnProcessIO(target_action=started["mock_bus"], on_stderr=once_ready(driver))
+    return [RegisterEventHandler(ready), *started.values()]
+
+
+def generate_launch_description() -> LaunchDescription:
+    """Describe the mock's graph."""
+    config = Path(get_package_share_directory("snake_control"), "config")
     return LaunchDescription(
         [
             DeclareLaunchArgument(
@@ -69,10 +91,9 @@ def generate_launch_description() -> LaunchDescription:
             DeclareLaunchArgument(
                 "namespace", default_value="", description="namespace of this robot"
             ),
-            # The driver needs the port.
-            RegisterEventHandler(
-                OnProcessIO(target_action=nodes["mock_bus"], on_stderr=once_ready(driver))
+            DeclareLaunchArgument(
+                "record", default_value="", description="MCAP file to make; empty: none"
             ),
-            *nodes.values(),
+            OpaqueFunction(function=nodes),
         ]
     )

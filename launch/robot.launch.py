@@ -1,6 +1,8 @@
-"""The robot: the four nodes; motion capture comes from elsewhere, on mocap/pose.
+"""The robot: its nodes; motion capture comes from elsewhere, on mocap/pose.
 
 ros2 launch snake_control robot.launch.py port:=/dev/serial/by-id/...
+
+Several at once, each in its namespace: namespace:=robot_1. record:=run.mcap records all topics.
 """
 
 from pathlib import Path
@@ -11,24 +13,33 @@ from launch.actions import DeclareLaunchArgument, OpaqueFunction
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
-NODES = ("bus_driver", "pose_input", "scp_controller", "trajectory_generator")
+from snake_control.config.namespaces import robot_parameters
+
+NODES = ("bus_driver", "pose_input", "scp_controller", "trajectory_generator", "description")
 
 
 def nodes(context: LaunchContext) -> list[Node]:
     """Return the nodes; a port given as an argument wins over the file's."""
+    namespace = LaunchConfiguration("namespace").perform(context)
     port = LaunchConfiguration("port").perform(context)
-    own = {"bus_driver": [{"port": port}] if port else []}
+    record = LaunchConfiguration("record").perform(context)
+    own: dict[str, dict[str, str]] = robot_parameters(namespace)
+    own["bus_driver"] = {"port": port} if port else {}
+    own["record"] = {"file": record}
     return [
         Node(
             package="snake_control",
             executable=name,
             # The name makes `own` more than a wildcard, which the file's entry would beat.
             name=name,
-            namespace=LaunchConfiguration("namespace"),
-            parameters=[LaunchConfiguration("params_file"), *own.get(name, [])],
+            namespace=namespace,
+            parameters=[
+                LaunchConfiguration("params_file"),
+                *([own[name]] if own.get(name) else []),
+            ],
             output="screen",
         )
-        for name in NODES
+        for name in (*NODES, *(("record",) if record else ()))
     ]
 
 
@@ -47,6 +58,9 @@ def generate_launch_description() -> LaunchDescription:
             ),
             DeclareLaunchArgument(
                 "namespace", default_value="", description="namespace of this robot"
+            ),
+            DeclareLaunchArgument(
+                "record", default_value="", description="MCAP file to make; empty: none"
             ),
             OpaqueFunction(function=nodes),
         ]

@@ -17,6 +17,7 @@ from concurrent.futures import Future
 from typing import Any
 
 from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.clock import Clock, ClockType
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 from snake_interfaces.msg import JointVelocityCommand
@@ -36,6 +37,7 @@ from snake_control.nodes.bus_messages import (
     checked_velocities,
     diagnostics,
     no_diagnostics,
+    of_robot,
     time_message,
 )
 from snake_control.nodes.bus_requests import NotLoweredError
@@ -275,7 +277,7 @@ class BusDriver(ManagedNode):
         snapshot, driver = self._last, self._config.bus_driver
         stamp = time_message(self.get_clock().now().nanoseconds)
         if snapshot is None:
-            self._diagnostics.publish(no_diagnostics(driver.port, stamp))
+            self._tell_health(no_diagnostics(driver.port, stamp))
             return
         torques = self._load.expected([reading.angle for reading in snapshot.readings])
         verdicts = tuple(
@@ -285,7 +287,10 @@ class BusDriver(ManagedNode):
         self._health = Health(verdicts, torques)
         self._log_changes(snapshot)
         self._log_rehearsal(snapshot)
-        self._diagnostics.publish(diagnostics(snapshot, self._health, driver.port, stamp))
+        self._tell_health(diagnostics(snapshot, self._health, driver.port, stamp))
+
+    def _tell_health(self, array: DiagnosticArray) -> None:
+        self._diagnostics.publish(of_robot(array, self.get_namespace()))
 
     def _log_changes(self, snapshot: Snapshot) -> None:
         log = self.get_logger()

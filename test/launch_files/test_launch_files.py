@@ -11,11 +11,16 @@ import pytest
 from support.graph import Graph
 
 ROOT = Path(__file__).resolve().parents[2]
-FOUR = {"bus_driver", "pose_input", "scp_controller", "trajectory_generator"}
-LAUNCHED = {"mock.launch.py": FOUR | {"mock_bus"}, "robot.launch.py": FOUR}
+ROBOT = {"bus_driver", "pose_input", "scp_controller", "trajectory_generator", "description"}
+LAUNCHED = {
+    "mock.launch.py": ROBOT | {"mock_bus"},
+    "robot.launch.py": ROBOT,
+    "view.launch.py": {"rviz2"},
+}
 ARGUMENTS = {
-    "mock.launch.py": {"case", "params_file", "namespace"},
-    "robot.launch.py": {"port", "params_file", "namespace"},
+    "mock.launch.py": {"case", "params_file", "namespace", "record"},
+    "robot.launch.py": {"port", "params_file", "namespace", "record"},
+    "view.launch.py": {"namespace"},
 }
 
 
@@ -47,7 +52,7 @@ def test_its_configuration_files_exist(name):
         for node in ast.walk(_tree(name))
         if isinstance(node, ast.Constant) and isinstance(node.value, str)
     ]
-    files = [word for word in words if re.fullmatch(r"\w+\.yaml", word)]
+    files = [word for word in words if re.fullmatch(r"\w+\.(yaml|rviz)", word)]
     assert files
     assert [file for file in files if not (ROOT / "config" / file).is_file()] == []
 

@@ -7,6 +7,7 @@ import json
 import re
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
+from pathlib import Path as FilePath
 from typing import Any
 
 import pytest
@@ -19,6 +20,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from visualization_msgs.msg import MarkerArray
 
+from snake_control.cli import layouts
 from snake_control.nodes import topics
 from snake_control.nodes.markers import RobotMarkers
 from support.robots import CONFIG, PAPER
@@ -188,3 +190,44 @@ def test_rviz_knows_the_namespaces_of_the_markers():
     assert set(markers["Namespaces"]) == drawn
     # Links and wheels are drawn by the model.
     assert [ns for ns, on in markers["Namespaces"].items() if not on] == ["links", "wheels"]
+
+
+def test_layouts_for_a_namespace_name_its_topics_and_frames(tmp_path, capsys):
+    assert layouts.main(["--namespace", "/robot_1", "--out", str(tmp_path)]) == 0
+    printed = capsys.readouterr().out.split()
+    assert [FilePath(path).name for path in printed] == [
+        "robot_1_snake.rviz",
+        "robot_1_foxglove.json",
+        "robot_1_plotjuggler.xml",
+    ]
+    for path, name in zip(printed, layouts.LAYOUTS, strict=True):
+        before = (CONFIG / name).read_text(encoding="utf-8")
+        after = FilePath(path).read_text(encoding="utf-8")
+        of_robots = [topic for topic in TOPICS if topic != "/diagnostics"]
+        pattern = rf"""(?<=[" ;])({"|".join(map(re.escape, of_robots))})(?![\w])"""
+        named = re.findall(pattern, before)
+        assert named
+        assert re.findall(pattern, after) == []
+        moved = re.findall(pattern.replace('(?<=[" ;])', "(?<=/robot_1)"), after)
+        assert moved == named
+        # Nothing else has changed but the frames.
+        back = after.replace("/robot_1/", "/")
+        for prefix in ('TF Prefix: "{}"', '"framePrefix": "{}"'):
+            for robot in ("robot_1", "robot_1/"):
+                back = back.replace(prefix.format(robot), prefix.format(""))
+        assert back == before
+    rviz_text = (tmp_path / "robot_1_snake.rviz").read_text()
+    assert 'TF Prefix: "robot_1"' in rviz_text
+    assert '"framePrefix": "robot_1/"' in (tmp_path / "robot_1_foxglove.json").read_text()
+
+
+def test_layouts_without_a_namespace_are_the_shipped_ones(tmp_path):
+    assert layouts.main(["--out", str(tmp_path)]) == 0
+    for name in layouts.LAYOUTS:
+        assert (tmp_path / FilePath(name).name).read_text() == (CONFIG / name).read_text()
+
+
+def test_a_place_that_cannot_be_written_is_named(tmp_path, capsys):
+    (tmp_path / "file").write_text("")
+    assert layouts.main(["--out", str(tmp_path / "file")]) == 1
+    assert str(tmp_path / "file") in capsys.readouterr().err
