@@ -15,7 +15,7 @@ NODES = (
     "record",
     "mock_bus",
 )
-COMMANDS = ("demo", "evaluate", "experiment", "layouts", "scp_study")
+COMMANDS = ("demo", "evaluate", "experiment", "layouts", "recording", "scp_study")
 
 setup(
     name=NAME,

@@ -16,6 +16,7 @@ _ANY_TIME = (
     "cli/test_experiment.py",
     "cli/test_memory.py",
     "cli/test_progress.py",
+    "cli/test_recording.py",
     "cli/test_scp_study.py",
     "faults/test_check.py",
     "nodes/test_bus_decision.py",

@@ -20,7 +20,7 @@ NODES = {
     "record",
     "mock_bus",
 }
-COMMANDS = {"ax12", "demo", "evaluate", "experiment", "layouts", "scp_study"}
+COMMANDS = {"ax12", "demo", "evaluate", "experiment", "layouts", "recording", "scp_study"}
 
 
 def _console_scripts() -> dict[str, str]:

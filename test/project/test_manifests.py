@@ -15,6 +15,7 @@ KEYS = {
     "hypothesis": "python3-hypothesis",
     "jinja2": "python3-jinja2",
     "matplotlib": "python3-matplotlib",
+    "mpl_toolkits": "python3-matplotlib",
     "numpy": "python3-numpy",
     "pytest": "python3-pytest",
     "scipy": "python3-scipy",
@@ -23,8 +24,8 @@ KEYS = {
     "tqdm": "python3-tqdm",
     "yaml": "python3-yaml",
 }
-# Not in apt; the one node that uses it says so where it is missing.
-OPTIONAL = {"mcap"}
+# Not in apt; what uses them says so where they are missing.
+OPTIONAL = {"mcap", "mcap_ros2", "zstandard"}
 # Needed without being imported: what starts the launch files, what dynamixel_sdk does not declare,
 # a plugin.
 NOT_IMPORTED = {"ros2launch", "python3-serial", "python3-pytest-timeout"}
@@ -62,7 +63,7 @@ def test_every_import_of_the_tests_is_declared():
     # requirements/bench.txt has what benchmarks compare with, requirements/dev.txt the exact
     # arithmetic; where that is missing its test is skipped.
     found = _imported("test", "benchmarks") - declared
-    others = {"distutils", "mcap_ros2", "mpmath", "pink", "threadpoolctl"}
+    others = {"distutils", "mpmath", "pink", "threadpoolctl"}
     assert found - OPTIONAL - others == set()
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -10,6 +11,7 @@ from mcap.reader import make_reader
 from mcap.records import Channel, Message, Schema
 from mcap.stream_reader import StreamReader
 from mcap_ros2.decoder import DecoderFactory
+from zstandard import ZstdError
 
 
 class Recorded(NamedTuple):
@@ -47,6 +49,6 @@ def recover(path: Path) -> list[Recorded]:
                     decoder = factory.decoder_for(channel.message_encoding, schema)
                     assert decoder is not None
                     found.append(Recorded(schema, channel, record, decoder(record.data)))
-        except EndOfFile:
+        except (EndOfFile, struct.error, ZstdError):
             pass
     return found
