@@ -11,6 +11,7 @@ mpl.use("Agg")
 
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
@@ -52,17 +53,19 @@ def draw_recording(recording: Recording, at_s: float, path: Path) -> Path:
     moments = (np.array(markers.times_ns) - zero_ns) * 1e-9
     nearest = int(np.argmin(np.abs(moments - at_s)))
     figure = plt.figure(figsize=(11.0, 5.0), layout="constrained")
-    grid = figure.add_gridspec(3, 2, width_ratios=(1.4, 1.0))
+    grid = figure.add_gridspec(3, 2, width_ratios=(1.5, 1.0))
     _draw_scene(figure.add_subplot(grid[:, 0], projection="3d"), markers.messages[nearest].markers)
     error = np.array([state.error[:3] for state in states.messages])
     rows = (
-        ("error x, y, z [mm]", 1e3 * error, "linear"),
+        ("error [mm]", 1e3 * error, "linear"),
         ("V_b1", np.array([state.v_b1 for state in states.messages]), "log"),
         ("d_min [mm]", np.array([1e3 * state.d_min for state in states.messages]), "linear"),
     )
     for row, (label, values, scale) in enumerate(rows):
         axes = figure.add_subplot(grid[row, 1])
-        axes.plot(seconds, values, linewidth=1.0)
+        lines = axes.plot(seconds, values, linewidth=1.0)
+        if len(lines) == 3:
+            axes.legend(lines, "xyz", loc="upper right", ncols=3, fontsize=8, frameon=False)
         axes.set_yscale(scale)
         axes.set_ylabel(label)
         axes.axvline(moments[nearest], color="0.5", linewidth=0.8)
@@ -101,8 +104,13 @@ def _draw_scene(axes: Any, markers: list[Any]) -> None:
         return
     low = np.min([points.min(axis=0) for points in seen], axis=0)
     high = np.max([points.max(axis=0) for points in seen], axis=0)
+    # A snake is long: room at its sides, so that the floor is seen.
+    side = 0.25 * (high - low).max()
+    low[1], high[1] = low[1] - side, high[1] + side
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(0.0, high[2]))
     axes.set_box_aspect((*(high - low)[:2], high[2]))
+    for axis in (axes.yaxis, axes.zaxis):
+        axis.set_major_locator(MaxNLocator(4))
 
 
 def _pose(marker: Any) -> tuple[Array, Rotation]:

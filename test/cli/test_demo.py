@@ -6,6 +6,7 @@ import json
 import os
 import signal
 import sys
+import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from snake_control.cli.demo_outcome import Outcome, RunJudge
 from snake_control.config import RobotConfig
 from snake_control.experiment.series import Series
 from snake_control.nodes.recorder import FOLLOWING
+from snake_control.nodes.topics import ALL
 from support.graph import Graph
 from support.process import Process
 from support.recordings import read
@@ -281,6 +283,13 @@ def test_ctrl_c_stops_the_nodes_in_order_and_writes_results(start):
     recorded = [state.w[0] for state in steps[first : first + len(series)]]
     assert recorded == pytest.approx(series.numbers("w_measured")[:, 0].tolist(), abs=1e-6)
     assert "none lost" in (demo.out / "logs" / "record.log").read_text()
+    heard = {entry.channel.topic for entry in recording}
+    mute = {"/cmd_vel", "/tf"}
+    assert heard | mute >= {
+        topic.name if topic.name[0] == "/" else f"/{topic.name}" for topic in ALL
+    }
+    description = next(e.decoded for e in recording if e.channel.topic == "/robot_description")
+    assert len(ElementTree.fromstring(description.data).findall("link")) == RobotConfig().links
     assert [kind for kind, pid in nodes.items() if not _ended(pid)] == []
 
 
