@@ -6,6 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
+pytest.importorskip("mcap_ros2", reason="needs pip install mcap-ros2-support")
+
 from rclpy.serialization import serialize_message
 from snake_interfaces.msg import ControllerState
 

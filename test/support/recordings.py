@@ -6,6 +6,10 @@ import struct
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import pytest
+
+pytest.importorskip("mcap_ros2", reason="needs pip install mcap-ros2-support")
+
 from mcap.exceptions import EndOfFile
 from mcap.reader import make_reader
 from mcap.records import Channel, Message, Schema
