@@ -8,6 +8,7 @@
 | `support_polygon` | 0               | green; amber if a fall is near, red once d_min is negative |
 | `P_G`             | 0               | the centre of mass on the floor, in the same colour        |
 | `reference`       | 0               | arrow that ends where the tip shall be, along its axis     |
+| `planned_path`    | 0               | where the reference goes, while there is a plan            |
 | `limits`          | number of joint | spheres at joints whose speed (amber) or range (red) bites |
 | `status`          | 0               | text of the status and d_min, in the status's colour       |
 
@@ -20,6 +21,7 @@ from __future__ import annotations
 import contextlib
 
 import numpy as np
+from nav_msgs.msg import Path
 from numpy.typing import NDArray
 from rclpy.duration import Duration
 from scipy.spatial.transform import Rotation
@@ -80,11 +82,17 @@ class RobotMarkers:
         self._polygon = _marker("support_polygon", 0, Marker.LINE_STRIP, (0.003, 0.0, 0.0))
         self._mass = _marker("P_G", 0, Marker.SPHERE, (0.012,) * 3)
         self._reference = _marker("reference", 0, Marker.ARROW, (0.012, 0.024, 0.02), _REFERENCE)
+        self._path = _marker("planned_path", 0, Marker.LINE_STRIP, (0.003, 0.0, 0.0), _REFERENCE)
         ball = (1.2 * max(robot.link_size_m),) * 3
         self._limits = [
             _marker("limits", joint, Marker.SPHERE, ball) for joint in range(1, robot.links)
         ]
         self._status = _marker("status", 0, Marker.TEXT_VIEW_FACING, (0.0, 0.0, 0.02))
+
+    def follow(self, path: Path) -> None:
+        """Draw another planned path from now on; none if it is empty or in another frame."""
+        ours = path.header.frame_id == self._frame_id
+        self._path.points = [pose.pose.position for pose in path.poses] if ours else []
 
     def draw(self, stamp_ns: int, q: Array | None, w_d: Array | None, step: Step) -> MarkerArray:
         """Return the markers of one moment.
@@ -107,6 +115,8 @@ class RobotMarkers:
             tail = w_d[:3] - 2.0 * self._size * forward
             self._reference.points = [point(tail), point(w_d[:3])]
             found.append(self._reference)
+        if len(self._path.points) > 1:
+            found.append(self._path)
         margin = "" if d_min is None else f"\nd_min {1e3 * d_min:.1f} mm"
         self._status.text = f"{step.text}{margin}"
         self._status.color = _COLOR_OF_STATUS.get(step.status, _BAD)

@@ -69,9 +69,9 @@ class Record(Node):
         """
         super().__init__("record", **overrides)
         self._own = own = NodeParameters(self, "record").config.record
-        self._qos_text, self._file = _open(
-            Path(own.file or time.strftime("snake_%Y%m%d_%H%M%S.mcap"))
-        )
+        self._writer = _writer()
+        path = Path(own.file or time.strftime("snake_%Y%m%d_%H%M%S.mcap"))
+        self._file = self._writer.McapFile(path)
         self._heard: dict[str, _Heard] = {}
         self._open_names: dict[str, list[topics.Topic]] = {}
         self._closed = self._behind = False
@@ -158,7 +158,7 @@ class Record(Node):
 
     def _announce(self, name: str, message_type: type) -> int:
         offered = self.get_publishers_info_by_topic(name)
-        metadata = {"offered_qos_profiles": self._qos_text(i.qos_profile for i in offered)}
+        metadata = {"offered_qos_profiles": self._writer.qos_text(i.qos_profile for i in offered)}
         if offered:
             metadata["topic_type_hash"] = str(offered[0].topic_type_hash)
         type_ = type_name(message_type)
@@ -209,23 +209,22 @@ class Record(Node):
         return sum(heard.messages for heard in self._heard.values())
 
 
-def _open(path: Path) -> tuple[Any, Any]:
-    """Return what makes QoS texts, and the new file.
+def _writer() -> Any:
+    """Return the module that writes the files.
 
     Raises:
-        ConfigError: the package ``mcap`` is missing, or the file cannot be made.
+        ConfigError: the package ``mcap`` is missing.
     """
     try:
         # Here, because robots do without it unless they record this way.
-        from snake_control.nodes.mcap_file import McapFile, qos_text
+        from snake_control.nodes import mcap_file
     except ModuleNotFoundError as error:
         raise ConfigError(
-            "file",
-            str(path),
-            f"the Python package {error.name} is missing: pip install mcap, "
-            "or record with ros2 bag record -s mcap",
+            "record",
+            error.name,
+            "not installed: pip install mcap, or record with ros2 bag record -s mcap",
         ) from error
-    return qos_text, McapFile(path)
+    return mcap_file
 
 
 def main() -> int:

@@ -109,6 +109,9 @@ class ScpControllerNode(Node):
         t = topics.BUS_STATE
         self.create_subscription(t.type, t.name, self._hear_bus, t.newest_only)
 
+        t = topics.HEAD_PLANNED_PATH
+        self.create_subscription(t.type, t.name, self._drawn.follow, t.qos)
+
         t = topics.JOINT_VELOCITY_COMMAND
         self._command = self.create_publisher(t.type, t.name, t.qos)
         t = topics.CONTROLLER_STATE

@@ -188,8 +188,9 @@ def test_rviz_knows_the_namespaces_of_the_markers():
     lists = [value if isinstance(value, list) else [value] for value in painter]
     drawn = {marker.ns for value in lists for marker in value if hasattr(marker, "ns")}
     assert set(markers["Namespaces"]) == drawn
-    # Links and wheels are drawn by the model.
-    assert [ns for ns, on in markers["Namespaces"].items() if not on] == ["links", "wheels"]
+    # What the model and the display of the path draw.
+    off = [ns for ns, on in markers["Namespaces"].items() if not on]
+    assert off == ["links", "planned_path", "wheels"]
 
 
 def test_layouts_for_a_namespace_name_its_topics_and_frames(tmp_path, capsys):

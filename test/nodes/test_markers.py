@@ -7,6 +7,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from geometry_msgs.msg import PoseStamped
+from nav_msgs.msg import Path
 from scipy.spatial.transform import Rotation
 from snake_interfaces.msg import ControllerState
 from visualization_msgs.msg import Marker
@@ -16,7 +18,7 @@ from snake_control.model.geometry import geometry, link_centers, link_points, wh
 from snake_control.model.rotation import rotation_from_rpy
 from snake_control.model.stability import support
 from snake_control.nodes.controller_messages import Step
-from snake_control.nodes.conversions import array
+from snake_control.nodes.conversions import array, header, pose_message
 from snake_control.nodes.markers import RobotMarkers
 from support.robots import PAPER, ROBOTS
 
@@ -102,6 +104,25 @@ def test_names_stay_and_what_is_gone_disappears():
     waiting = painter.draw(3, None, None, step_of(PAPER, ControllerState.STATUS_STALE, "why"))
     assert [(m.ns, m.text) for m in waiting.markers] == [("status", "why")]
     assert rgb(waiting.markers[0]) == RED
+
+
+def test_the_planned_path_is_shown_while_there_is_one():
+    painter = RobotMarkers(PAPER, "world")
+    path = Path(header=header(0, "world"))
+    path.poses = [PoseStamped(pose=pose_message(W_D + 0.1 * i)) for i in range(3)]
+
+    def shown():
+        markers = painter.draw(1, None, None, step_of(PAPER)).markers
+        return [array(p).tolist() for m in markers if m.ns == "planned_path" for p in m.points]
+
+    assert shown() == []
+    painter.follow(path)
+    np.testing.assert_allclose(shown(), [W_D[:3] + 0.1 * i for i in range(3)])
+    painter.follow(Path(header=header(0, "world")))
+    assert shown() == []
+    path.header.frame_id = "elsewhere"
+    painter.follow(path)
+    assert shown() == []
 
 
 def test_limits_that_bite_are_seen_where_they_bite():
