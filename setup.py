@@ -27,6 +27,7 @@ setup(
         (f"share/{NAME}", ["package.xml"]),
         (f"share/{NAME}/config", sorted(glob("config/*.yaml") + glob("config/*.rviz"))),
         (f"share/{NAME}/config/layouts", sorted(glob("config/layouts/*"))),
+        (f"share/{NAME}/config/trajectories", sorted(glob("config/trajectories/*"))),
         (f"share/{NAME}/launch", sorted(glob("launch/*.launch.py"))),
     ],
     install_requires=["setuptools"],

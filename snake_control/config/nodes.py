@@ -249,26 +249,54 @@ class TrajectoryGeneratorConfig:
         high=10.0,
     )
     max_linear_speed_m_s: float = parameter(
-        0.05, "cmd_vel is limited to this speed [m/s]", low=1e-4, high=10.0
+        0.05,
+        "cmd_vel is limited to this speed, faster trajectories are refused [m/s]",
+        low=1e-4,
+        high=10.0,
     )
     max_angular_speed_rad_s: float = parameter(
-        0.3, "cmd_vel is limited to this angular speed [rad/s]", low=1e-4, high=10.0
+        0.3,
+        "cmd_vel is limited to this angular speed; trajectories, by each of R, P, Y [rad/s]",
+        low=1e-4,
+        high=10.0,
     )
     max_linear_acceleration_m_s2: float = parameter(
-        0.1, "how fast the teleoperated head speeds up and slows down [m/s^2]", low=1e-3, high=100.0
+        0.1,
+        "how fast the teleoperated head speeds up and slows down, and trajectories may [m/s^2]",
+        low=1e-3,
+        high=100.0,
     )
     max_angular_acceleration_rad_s2: float = parameter(
-        1.0, "the same for its rotation [rad/s^2]", low=1e-3, high=100.0
+        1.0,
+        "how fast the rates of R, P, Y of a teleoperated head change [rad/s^2]",
+        low=1e-3,
+        high=100.0,
     )
 
     speed_m_s: float = parameter(
-        0.01, "follow_head_trajectory: speed of the tip, if none is given [m/s]", low=1e-4, high=1.0
+        0.01,
+        "files, goals and paths: speed of the tip, if none is given [m/s]",
+        low=1e-4,
+        high=1.0,
     )
     turning_speed_rad_s: float = parameter(
         0.1,
-        "follow_head_trajectory: speed of each of roll, pitch and yaw, if none is given [rad/s]",
+        "files, goals and paths: speed of each of roll, pitch and yaw, if none is given [rad/s]",
         low=1e-4,
         high=10.0,
+    )
+    acceleration_m_s2: float = parameter(
+        0.02,
+        "files, goals and paths: acceleration along the path, if none is given [m/s^2]",
+        low=1e-3,
+        high=100.0,
+    )
+    min_turn_radius_m: float = parameter(
+        0.1,
+        "files, goals and paths: a curve that turns on more tightly is refused at once; 0 for none "
+        "(the rehearsal refuses what the robot cannot do, too) [m]",
+        low=0.0,
+        high=100.0,
     )
     arrival_position_m: float = parameter(
         0.01, "follow_head_trajectory: the head has arrived within this [m]", low=1e-4, high=1.0

@@ -38,17 +38,38 @@ def read_yaml(path: str | Path) -> Any:
     Raises:
         ConfigFileError: the file is missing, is no text in UTF-8, or no YAML.
     """
+    return parse_yaml(read_text(path), str(path))
+
+
+def read_text(path: str | Path) -> str:
+    """Return what a text file holds.
+
+    Raises:
+        ConfigFileError: the file is missing, or is no text in UTF-8.
+    """
     try:
-        text = Path(path).read_text(encoding="utf-8")
+        return Path(path).read_text(encoding="utf-8")
     except OSError as error:
         raise ConfigFileError(str(path), f"cannot be read: {error.strerror}") from error
     except UnicodeDecodeError as error:
         raise ConfigFileError(str(path), "is no text in UTF-8") from error
+
+
+def parse_yaml(text: str, name: str) -> Any:
+    """Return what a text in YAML holds, numbers read as rcl reads them; ``None`` if it is empty.
+
+    Args:
+        text: the YAML.
+        name: where it is from, for errors.
+
+    Raises:
+        ConfigFileError: it is no YAML.
+    """
     try:
         return yaml.load(text, Loader=_RclLoader)
     # PyYAML lets errors of what it makes through, such as that of a month 13.
     except (yaml.YAMLError, ValueError) as error:
-        raise ConfigFileError(str(path), f"is not valid YAML: {error}") from error
+        raise ConfigFileError(name, f"is not valid YAML: {error}") from error
 
 
 def read_sections(path: str | Path) -> list[tuple[str, dict[str, Any]]]:

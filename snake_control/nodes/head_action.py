@@ -28,7 +28,7 @@ from snake_control.experiment.rehearsal import Rehearsal, rehearse
 from snake_control.model.rotation import wrap
 from snake_control.nodes import topics
 from snake_control.nodes.conversions import MessageError, pose_array, require_frame
-from snake_control.trajectory.plan import Plan
+from snake_control.trajectory.plan import Plan, course_through
 from snake_control.trajectory.sequence import ReferenceSequence
 
 Array = NDArray[np.float64]
@@ -200,7 +200,8 @@ class HeadAction:
             require_frame(goal, self._own.frame_id)
             poses = np.reshape([_pose(i, pose) for i, pose in enumerate(goal.poses)], (-1, 6))
             times = [time.sec + 1e-9 * time.nanosec for time in goal.time_from_start]
-            run.plan = Plan(self._own, start, poses, times, goal.speed, goal.turning_speed)
+            course = course_through(poses, times, goal.speed, goal.turning_speed)
+            run.plan = Plan(self._own, course, start)
         except SnakeError as error:
             self._end(run, Result.INVALID, str(error), around)
             return None

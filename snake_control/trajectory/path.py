@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import CubicSpline
 from scipy.special import ellipj, ellipk
 
 from snake_control.control.reference import Reference
 
 Array = NDArray[np.float64]
+
+_SAMPLES = 10
+_MOST_MOMENTS = 2000
 
 
 class PathPoint(NamedTuple):
@@ -31,10 +36,12 @@ class Path(Protocol):
     """A curve in space with an attitude at each of its points.
 
     Attributes:
-        length: of the curve on the floor plan [m].
+        length: of the curve on the floor plan [m]; turning may count, too.
+        pieces: of how many the curve consists.
     """
 
     length: float
+    pieces: int
 
     def at(self, s: float) -> PathPoint:
         """Return the point after the length ``s`` [m], 0 .. ``length``."""
@@ -54,6 +61,7 @@ class Circle:
         self._start = np.array(start_pose, dtype=float)
         self._radius = radius
         self.length = math.tau * abs(radius) * turns
+        self.pieces = max(1, math.ceil(4.0 * turns))
 
     def at(self, s: float) -> PathPoint:
         """Return the point after the length ``s`` [m]."""
@@ -92,6 +100,7 @@ class FigureEight:
         self._side = math.copysign(1.0, radius)
         self._a = 3.0 * abs(radius)
         self.length = 4.0 * _QUARTER * self._a * rounds
+        self.pieces = max(1, math.ceil(8.0 * rounds))
 
     def at(self, s: float) -> PathPoint:
         """Return the point after the length ``s`` [m]."""
@@ -118,6 +127,55 @@ class FigureEight:
         )
 
 
+class Straight:
+    """From one pose to another; each coordinate changes evenly."""
+
+    def __init__(self, start_pose: ArrayLike, by: ArrayLike, length: float) -> None:
+        """Define the path.
+
+        Args:
+            start_pose: [x, y, z, R, P, Y], (6,) [m, rad].
+            by: by how much they change, (6,) [m, rad].
+            length: what counts as its length, >= 0 [m].
+        """
+        self._start = np.array(start_pose, dtype=float)
+        self._by = np.array(by, dtype=float)
+        self.length = length
+        self.pieces = 1
+
+    def at(self, s: float) -> PathPoint:
+        """Return the point after the length ``s`` [m]."""
+        slope = self._by / self.length
+        return PathPoint(self._start + s * slope, slope, np.zeros(6))
+
+
+class Through:
+    """Through poses: the cubic spline by the length of the straight ways between them."""
+
+    def __init__(self, poses: ArrayLike, lengths: ArrayLike, names: Sequence[str] = ()) -> None:
+        """Define the path.
+
+        Args:
+            poses: [x, y, z, R, P, Y], no whole turns between two of them, (k, 6) [m, rad].
+            lengths: of the ways between them, > 0, (k-1,) [m].
+            names: what to call each pose.
+        """
+        self._names = list(names)
+        self._knots = np.concatenate(([0.0], np.cumsum(np.asarray(lengths, dtype=float))))
+        self.length = float(self._knots[-1])
+        self.pieces = len(self._knots) - 1
+        self._spline = CubicSpline(self._knots, np.asarray(poses, dtype=float), bc_type="natural")
+
+    def name(self, s: float) -> str:
+        """Return the name of the pose that comes next after the length ``s`` [m]."""
+        i = min(int(np.searchsorted(self._knots, s)), self.pieces)
+        return self._names[i] if self._names else ""
+
+    def at(self, s: float) -> PathPoint:
+        """Return the point after the length ``s`` [m]."""
+        return PathPoint(self._spline(s), self._spline(s, 1), self._spline(s, 2))
+
+
 _QUARTER = float(ellipk(0.5)) / math.sqrt(2.0)
 """Length of a quarter of the lemniscate with a = 1: half of the lemniscate constant, 1.3110."""
 
@@ -126,6 +184,11 @@ class Along:
     """Follows a path: speeds up evenly, keeps a speed, slows down evenly, and holds the end.
 
     The acceleration itself grows and shrinks as sin^2, so the motion is smooth up to it.
+
+    Attributes:
+        path: the curve.
+        duration: [s].
+        ramp: how long it speeds up, and slows down [s].
     """
 
     def __init__(self, path: Path, speed: float, acceleration: float, start: float = 0.0) -> None:
@@ -137,35 +200,46 @@ class Along:
             acceleration: largest acceleration along it, > 0 [m/s^2].
             start: time at which it starts [s]; before it the start is held.
         """
-        self._path = path
+        self.path = path
         self._start = start
         # A ramp of the form sin^2 takes twice as long as one of constant acceleration.
-        self._ramp = 2.0 * speed / acceleration
-        if speed * self._ramp > path.length:
-            self._ramp = math.sqrt(2.0 * path.length / acceleration)
-            speed = path.length / self._ramp
+        self.ramp = 2.0 * speed / acceleration
+        if speed * self.ramp > path.length:
+            self.ramp = math.sqrt(2.0 * path.length / acceleration)
+            speed = path.length / self.ramp
         self._speed = speed
-        self.duration = path.length / speed + self._ramp
+        self.duration = path.length / speed + self.ramp
 
     def sample(self, t: float) -> Reference:
         """Return pose, rate and acceleration at time ``t`` [s]."""
         s, rate, acceleration = self._progress(t - self._start)
-        point = self._path.at(s)
+        point = self.path.at(s)
         return Reference(
             point.w, rate * point.by_s, acceleration * point.by_s + rate**2 * point.by_s2
         )
 
+    def progress(self, t: float) -> float:
+        """Return the length that is behind it at time ``t`` since its start [m]."""
+        return self._progress(t)[0]
+
+    def moments(self) -> Array:
+        """Return times from begin to end, (k,) [s]."""
+        samples = min(_MOST_MOMENTS, _SAMPLES * self.path.pieces)
+        cruise = np.linspace(self.ramp, self.duration - self.ramp, samples)
+        ramp = np.linspace(0.0, self.ramp, _SAMPLES)
+        return np.concatenate((ramp, cruise, self.duration - ramp[::-1]))
+
     def _progress(self, t: float) -> tuple[float, float, float]:
         if t >= self.duration:
-            return self._path.length, 0.0, 0.0
-        if t > self.duration - self._ramp:
+            return self.path.length, 0.0, 0.0
+        if t > self.duration - self.ramp:
             s, rate, acceleration = self._ramped(self.duration - t)
-            return self._path.length - s, rate, -acceleration
+            return self.path.length - s, rate, -acceleration
         return self._ramped(max(t, 0.0))
 
     def _ramped(self, t: float) -> tuple[float, float, float]:
         """Return length, speed and acceleration from rest, after ``t`` [s]."""
-        ramp, speed = self._ramp, self._speed
+        ramp, speed = self.ramp, self._speed
         if t >= ramp:
             return speed * (t - 0.5 * ramp), speed, 0.0
         k = math.tau / ramp

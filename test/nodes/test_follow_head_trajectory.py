@@ -72,7 +72,7 @@ def test_the_head_goes_through_the_poses_and_tells_how_far_it_is(robot, client):
             (0.1, 0, 0, 0, 0, 0),
             {"time_from_start": [Duration(sec=-3)]},
             Result.INVALID,
-            "pose 0 is to be reached at -3",
+            "pose 0 comes at -3 s",
         ),
     ],
 )
