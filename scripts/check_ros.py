@@ -14,6 +14,7 @@ NEEDED = {
     "sensor_msgs": "ros-jazzy-sensor-msgs",
     "nav_msgs": "ros-jazzy-nav-msgs",
     "diagnostic_msgs": "ros-jazzy-diagnostic-msgs",
+    "trajectory_msgs": "ros-jazzy-trajectory-msgs",
     "visualization_msgs": "ros-jazzy-visualization-msgs",
     "dynamixel_sdk": "ros-jazzy-dynamixel-sdk",
     "pinocchio": "ros-jazzy-pinocchio",

@@ -208,8 +208,14 @@ class TrajectoryGeneratorConfig:
     frame_id: str = parameter("world", "frame of the references")
     trajectory: str = parameter(
         "line",
-        "what ~/start follows: line, or hold (stay where the head is)",
-        choices=("line", "hold"),
+        "what ~/start follows: line, hold (stay where the head is), or file (trajectory_file)",
+        choices=("line", "hold", "file"),
+    )
+    trajectory_file: str = parameter(
+        "",
+        "a .yaml or .csv file that ~/start follows, whatever trajectory says (docs/drive.md); "
+        "empty for none",
+        run_time=True,
     )
     start_from: str = parameter(
         "given",
@@ -298,6 +304,13 @@ class TrajectoryGeneratorConfig:
         low=0.0,
         high=100.0,
     )
+    stamp_tolerance_s: float = parameter(
+        0.5,
+        "head/path and head/trajectory: how far in the past a stamp may be that says when to start "
+        "[s]",
+        low=0.0,
+        high=60.0,
+    )
     arrival_position_m: float = parameter(
         0.01, "follow_head_trajectory: the head has arrived within this [m]", low=1e-4, high=1.0
     )
@@ -317,6 +330,13 @@ class TrajectoryGeneratorConfig:
             values = getattr(self, name)
             if len(values) != 6:
                 raise ConfigError(name, list(values), "give 6 numbers: x, y, z, R, P, Y")
+        if self.trajectory == "file" and not self.trajectory_file:
+            raise ConfigError("trajectory_file", "", "name the file that ~/start shall follow")
+
+    @property
+    def follows_file(self) -> bool:
+        """Whether ``~/start`` follows a file."""
+        return bool(self.trajectory_file)
 
 
 @dataclasses.dataclass(frozen=True)

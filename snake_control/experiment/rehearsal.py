@@ -31,6 +31,7 @@ class Rehearsal:
         text: if not, what is in the way, when and where.
         took: time that it took, as a share of the planned one.
         error_m, error_rad: largest error of the head after a third of the time.
+        at: if not possible, the motion's own time at which it was held up [s], where that is known.
     """
 
     possible: bool
@@ -38,6 +39,7 @@ class Rehearsal:
     took: float
     error_m: float
     error_rad: float
+    at: float | None = None
 
 
 def rehearse(
@@ -70,7 +72,8 @@ def rehearse(
         result = sample.result
         if result is None:
             where = _where(sample, duration)
-            return Rehearsal(False, f"its reference is not finite {where}", 0.0, 0.0, 0.0)
+            words = f"its reference is not finite {where}"
+            return Rehearsal(False, words, 0.0, 0.0, 0.0, sample.own_t)
         if result.bound is not None:
             limit = result.bound.limit
             slowed[limit] = slowed.get(limit, 0.0) + 1.0 - result.reference_scale
@@ -85,18 +88,17 @@ def rehearse(
     took = robot.t / duration
     done = sample.own_t + 1.5 / config.scp_controller.rate_hz >= duration
     if robot.state.fallen:
-        return Rehearsal(False, "the robot would fall", took, error_m, error_rad)
+        return Rehearsal(False, "the robot would fall", took, error_m, error_rad, sample.own_t)
     if not done:
-        what = "it would take too long"
+        what, at = "it would take too long", sample.own_t
         if slowed:
             first = worst[max(slowed, key=slowed.__getitem__)]
-            what = f"{_words(first)} would hold it up {_where(first, duration)}"
-        return Rehearsal(False, what, took, error_m, error_rad)
+            what, at = f"{_words(first)} would hold it up {_where(first, duration)}", first.own_t
+        return Rehearsal(False, what, took, error_m, error_rad, at)
     if late is not None:
         words = f"the head would be {1e3 * error_m:.0f} mm and {error_rad:.2f} rad off"
-        return Rehearsal(
-            False, f"{words}, first {_where(late, duration)}", took, error_m, error_rad
-        )
+        words = f"{words}, first {_where(late, duration)}"
+        return Rehearsal(False, words, took, error_m, error_rad, late.own_t)
     return Rehearsal(True, "", took, error_m, error_rad)
 
 

@@ -99,6 +99,42 @@ def pose_array(pose: Pose) -> Array:
     return np.concatenate([position, rpy_from_quaternion(xyzw)])
 
 
+def poses_array(poses: Sequence[Pose], what: str = "pose") -> Array:
+    """Return poses as [x, y, z, R, P, Y], (k, 6) [m, rad].
+
+    Args:
+        poses: any number of them.
+        what: what to call one of them in errors.
+
+    Raises:
+        MessageError: names the pose that is none.
+    """
+    rows = []
+    for i, pose in enumerate(poses):
+        try:
+            rows.append(pose_array(pose))
+        except MessageError as error:
+            raise MessageError(f"{what} {i}: {error}") from error
+    return np.reshape(np.array(rows), (-1, 6))
+
+
+def frame_of_poses(message: Any, world_frame_id: str) -> str:
+    """Return what the poses of a message are relative to, as trajectories call it.
+
+    Raises:
+        MessageError: another frame than the world's and the head's.
+    """
+    frame = message.header.frame_id
+    if frame == HEAD_FRAME:
+        return "start"
+    if frame != world_frame_id:
+        raise MessageError(
+            f"its frame is '{frame}', expected '{world_frame_id}', or '{HEAD_FRAME}' for poses "
+            "relative to the head"
+        )
+    return "world"
+
+
 def rpy_rates(rpy: Array, angular_velocity: Array) -> Array:
     """Return the rates of R, P, Y that an angular velocity in the world means.
 

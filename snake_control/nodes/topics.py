@@ -25,6 +25,7 @@ from snake_interfaces.msg import (
     BusState,
     ControllerState,
     HeadReference,
+    HeadTrajectoryStatus,
     JointVelocityCommand,
     PlantState,
     PoseStatus,
@@ -32,6 +33,7 @@ from snake_interfaces.msg import (
 from snake_interfaces.srv import InjectFault
 from std_msgs.msg import Bool, String
 from std_srvs.srv import SetBool, Trigger
+from trajectory_msgs.msg import MultiDOFJointTrajectory
 from visualization_msgs.msg import MarkerArray
 
 try:
@@ -107,6 +109,14 @@ HEAD_STATUS = Topic("head/status", PoseStatus, _STATE)
 
 HEAD_REFERENCE = Topic("head/reference", HeadReference, _COMMAND)
 HEAD_PLANNED_PATH = Topic("head/planned_path", Path, _LATCHED)
+HEAD_PATH = Topic("head/path", Path, _STATE)
+HEAD_TRAJECTORY = Topic("head/trajectory", MultiDOFJointTrajectory, _STATE)
+# Each status counts: one may say why a motion was refused while another goes on.
+HEAD_TRAJECTORY_STATUS = Topic(
+    "head/trajectory_status",
+    HeadTrajectoryStatus,
+    _reliable(10, DurabilityPolicy.TRANSIENT_LOCAL),
+)
 CMD_VEL = Topic("cmd_vel", TwistStamped, _COMMAND)
 CMD_VEL_UNSTAMPED = Topic("cmd_vel", Twist, _COMMAND)
 
@@ -138,5 +148,7 @@ CLEAR_FAULTS = Service("~/clear_faults", Trigger)
 ENABLE = Service("~/enable", SetBool)
 START = Service("~/start", Trigger)
 STOP = Service("~/stop", Trigger)
+PREVIEW = Service("~/preview", Trigger)
+RETURN = Service("~/return", Trigger)
 
 FOLLOW_HEAD_TRAJECTORY = Action("follow_head_trajectory", FollowHeadTrajectory)

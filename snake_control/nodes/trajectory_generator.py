@@ -1,10 +1,10 @@
 """Node ``trajectory_generator``: sends ``head/reference`` for a trajectory or for ``cmd_vel``.
 
-Nothing is sent before ``~/start`` (or the parameter ``autostart``), ``cmd_vel`` or a goal of the
-action ``follow_head_trajectory``. ``~/stop``, or
-``cmd_vel`` that ceases, brings the reference to rest; then it is no longer sent, and the controller
-reports a stale reference and commands zero. ``cmd_vel`` takes over from whatever is being followed,
-unless it is zero: a joystick at rest starts and takes over nothing.
+Nothing is sent before ``~/start`` (or the parameter ``autostart``), ``~/return``, ``cmd_vel`` or a
+goal of the action ``follow_head_trajectory``. ``~/stop``, or ``cmd_vel`` that ceases, brings the
+reference to rest; then it is no longer sent, and the controller reports a stale reference and
+commands zero. ``cmd_vel`` takes over from whatever is being followed, unless it is zero: a joystick
+at rest starts and takes over nothing.
 
 ``controller_state`` says how fast the reference may go on (``reference_scale``): near a limit of
 the robot it slows down, and it waits while the controller does not follow. Where no controller is
@@ -24,11 +24,16 @@ from geometry_msgs.msg import PoseStamped, Twist, TwistStamped
 from nav_msgs.msg import Path
 from numpy import float64
 from numpy.typing import NDArray
+from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
+from rclpy.task import Future
 from snake_interfaces.msg import ControllerState
 from std_srvs.srv import Trigger
 
+from snake_control.config import Config
+from snake_control.control.reference import Reference
+from snake_control.errors import ConfigError, ConfigFileError
 from snake_control.nodes import topics
 from snake_control.nodes.conversions import (
     HEAD_FRAME,
@@ -41,17 +46,21 @@ from snake_control.nodes.conversions import (
     reference_message,
     stamp_ns,
 )
-from snake_control.nodes.head_action import HeadAction, Surroundings
+from snake_control.nodes.head_action import HeadAction
+from snake_control.nodes.head_motion import HeadMotion, Movable, Request, Surroundings
 from snake_control.nodes.inputs import FUTURE_TOLERANCE_S, Input
 from snake_control.nodes.parameters import NodeParameters
 from snake_control.nodes.process import run
+from snake_control.trajectory.configured import ENDLESS_S, ConfiguredPlan
+from snake_control.trajectory.course_text import read_course
 from snake_control.trajectory.plan import Plan
 from snake_control.trajectory.sequence import Outcome, ReferenceSequence
 
-# How the planned path of a line is drawn.
+# How planned paths are drawn.
 _PATH_POINTS = 61
+_PATH_STEP_S = 0.5
+_PATH_POINTS_MOST = 401
 _CONTROLLER_SILENT_S = 0.5
-_ENDLESS_PATH_S = 60.0
 
 
 class TrajectoryGenerator(Node):
@@ -59,7 +68,8 @@ class TrajectoryGenerator(Node):
 
     def __init__(self, **overrides: Any) -> None:
         super().__init__("trajectory_generator", **overrides)
-        configured = NodeParameters(self, "trajectory_generator").config
+        self._node_parameters = NodeParameters(self, "trajectory_generator", prepare=_check_file)
+        configured = self._node_parameters.config
         self._config = config = configured.trajectory_generator
         self._sequence = ReferenceSequence(config)
         self._autostart = config.autostart
@@ -79,7 +89,8 @@ class TrajectoryGenerator(Node):
             config.head_timeout_s,
             lambda message: joint_motion(message, configured.robot.joint_names)[0],
         )
-        self._action = HeadAction(self, configured, self._sequence, self._publish_plan)
+        self._motion = HeadMotion(self, configured, self._sequence, self._publish_plan)
+        self._action = HeadAction(self, self._motion, config.frame_id, self._steady_s)
 
         t = topics.HEAD_REFERENCE
         self._reference = self.create_publisher(t.type, t.name, t.qos)
@@ -94,8 +105,15 @@ class TrajectoryGenerator(Node):
         t = topics.CMD_VEL if config.cmd_vel_stamped else topics.CMD_VEL_UNSTAMPED
         callback = self._on_cmd_vel if config.cmd_vel_stamped else self._on_unstamped_cmd_vel
         self.create_subscription(t.type, t.name, callback, t.qos)
-        self.create_service(topics.START.type, topics.START.name, self._on_start)
         self.create_service(topics.STOP.type, topics.STOP.name, self._on_stop)
+        # These wait for a rehearsal, and must not keep the others waiting.
+        group = ReentrantCallbackGroup()
+        for service, answer in (
+            (topics.START, self._on_start),
+            (topics.PREVIEW, self._on_preview),
+            (topics.RETURN, self._on_return),
+        ):
+            self.create_service(service.type, service.name, answer, callback_group=group)
         self.create_timer(1.0 / config.rate_hz, self._step, clock=self._steady)
 
     def _on_controller_state(self, message: ControllerState) -> None:
@@ -121,37 +139,61 @@ class TrajectoryGenerator(Node):
         scale = 1.0 if controller is None else controller.reference_scale
         self._sequence.time_scale = scale if 0.0 <= scale <= 1.0 else 1.0
         phi = None if self._joints.problem(now) else self._joints.value
-        self._action.step(Surroundings(steady, self._head_pose(now), phi, controller))
+        self._motion.step(Surroundings(steady, self._head_pose(now), phi, controller))
         reference = self._sequence.sample(steady)
         if reference is not None:
             self._reference.publish(reference_message(reference, now, self._config.frame_id))
             if self._sequence.idle:
                 self.get_logger().info("the head is at rest: no more references")
 
-    def _start(self, now: int) -> Outcome:
+    def _start(self, now: int) -> Future:
+        """Start what is configured; the future's result is an ``Outcome``."""
         # A start by hand, or one that cmd_vel made, is not repeated by itself later.
         self._autostart = False
-        outcome = self._sequence.start(self._steady_s(), self._head_pose(now))
+        steady, head = self._steady_s(), self._head_pose(now)
+        path = self._node_parameters.config.trajectory_generator.trajectory_file
+        if path and self._sequence.idle:
+            return self._motion.ask(Request("~/start", lambda _: read_course(path)), steady)
+        outcome = self._sequence.start(steady, head)
         if outcome.done:
-            self._action.take_over("~/start")
+            self._motion.take_over("~/start")
+            begin = self._sequence.here(steady, head)
+            assert begin is not None
+            self._motion.note_begin(begin.w_d)
             self._publish_path(now)
         self.get_logger().info(f"start: {outcome.text}")
-        return outcome
+        started = Future()
+        started.set_result(outcome)
+        return started
 
-    def _on_start(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        outcome = self._start(self._now())
-        response.success, response.message = outcome.done, outcome.text
-        return response
+    async def _on_start(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        return _answer(response, await self._start(self._now()))
+
+    async def _on_return(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        self._autostart = False
+        begun = self._motion.go_back(self._steady_s())
+        if begun is None:
+            return _answer(response, Outcome(False, "no motion has begun yet"))
+        return _answer(response, await begun)
+
+    async def _on_preview(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        config = self._node_parameters.config.trajectory_generator
+
+        def plan(start: Reference) -> Movable:
+            if config.follows_file:
+                return Plan(config, read_course(config.trajectory_file), start)
+            return ConfiguredPlan(config, start.w_d)
+
+        return _answer(response, await self._motion.preview(plan, self._steady_s()))
 
     def _on_stop(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         now = self._now()
         self._autostart = False
-        self._action.let_stop()
+        self._motion.let_stop()
         outcome = self._sequence.stop(self._steady_s())
         self._publish_path(now)
         self.get_logger().info(f"stop: {outcome.text}")
-        response.success, response.message = outcome.done, outcome.text
-        return response
+        return _answer(response, outcome)
 
     def _on_unstamped_cmd_vel(self, message: Twist) -> None:
         frame = self._config.cmd_vel_frame
@@ -186,7 +228,7 @@ class TrajectoryGenerator(Node):
         if not self._sequence.commanded:
             return
         self._autostart = False
-        self._action.take_over("cmd_vel")
+        self._motion.take_over("cmd_vel")
         if was_idle:
             self.get_logger().info(outcome.text)
         self._publish_path(now)
@@ -194,12 +236,13 @@ class TrajectoryGenerator(Node):
     def _ignore_cmd_vel(self, reason: str) -> None:
         self.get_logger().warning(f"cmd_vel ignored: {reason}", throttle_duration_sec=1.0)
 
-    def _publish_plan(self, plan: Plan) -> None:
-        """Show a goal's motion."""
+    def _publish_plan(self, plan: Movable) -> None:
+        """Show a motion."""
         now, frame = self._now(), self._config.frame_id
         motion = plan.made()(0.0)
         path = Path(header=header(now, frame))
-        for t in np.linspace(0.0, plan.duration, _PATH_POINTS).tolist():
+        points = min(max(round(plan.duration / _PATH_STEP_S), _PATH_POINTS), _PATH_POINTS_MOST)
+        for t in np.linspace(0.0, plan.duration, points).tolist():
             stamp = header(now + round(t * 1e9), frame)
             path.poses.append(PoseStamped(header=stamp, pose=pose_message(motion.sample(t).w_d)))
         self._has_path = True
@@ -217,13 +260,29 @@ class TrajectoryGenerator(Node):
             start_ns = now - round(self._sequence.motion_time(self._steady_s()) * 1e9)
             path.poses = [
                 PoseStamped(header=header(start_ns + round(t * 1e9), frame), pose=pose_message(w_d))
-                for t, w_d in line.path(_PATH_POINTS, _ENDLESS_PATH_S)
+                for t, w_d in line.path(_PATH_POINTS, ENDLESS_S)
             ]
         self._path.publish(path)
 
     def close(self) -> None:
         """References cease, and the controller then commands zero."""
+        self._motion.close()
         self._action.close()
+
+
+def _check_file(config: Config) -> None:
+    """Refuse a file that is none; it is read again when it is followed."""
+    own = config.trajectory_generator
+    if own.follows_file:
+        try:
+            read_course(own.trajectory_file)
+        except ConfigFileError as error:
+            raise ConfigError("trajectory_file", own.trajectory_file, str(error)) from error
+
+
+def _answer(response: Trigger.Response, outcome: Outcome) -> Trigger.Response:
+    response.success, response.message = outcome.done, outcome.text
+    return response
 
 
 def main() -> int:

@@ -38,13 +38,14 @@ def read_course(path: str | Path) -> Course:
     return parse_course(read_text(path), str(path), Path(path).suffix.lower() == ".csv")
 
 
-def parse_course(text: str, name: str, is_csv: bool | None = None) -> Course:
+def parse_course(text: str, name: str, is_csv: bool | None = None, frame: str = "world") -> Course:
     """Return the trajectory that a text describes.
 
     Args:
         text: CSV or YAML.
         name: where it is from, for errors.
         is_csv: which of both; ``None`` to tell it by its first line.
+        frame: what poses of a CSV are relative to (``Settings.frame``).
 
     Raises:
         ConfigFileError: names the segment or line that is wrong.
@@ -53,7 +54,7 @@ def parse_course(text: str, name: str, is_csv: bool | None = None) -> Course:
         lines = [line for line in text.splitlines() if line.strip() and line.strip()[0] != "#"]
         is_csv = bool(lines) and set(_POSITION) <= {c.strip() for c in lines[0].split(",")}
     try:
-        return _table(text) if is_csv else _segments(parse_yaml(text, name))
+        return _table(text, frame) if is_csv else _segments(parse_yaml(text, name))
     except ConfigError as error:
         raise ConfigFileError(name, str(error)) from error
 
@@ -123,7 +124,7 @@ def _rows(poses: Any) -> tuple[tuple[float, ...], ...]:
     return tuple(number.parse(f"poses[{i}]", pose) for i, pose in enumerate(poses))
 
 
-def _table(text: str) -> Course:
+def _table(text: str, frame: str) -> Course:
     rows = [
         (number, [cell.strip() for cell in row])
         for number, row in _numbered(text)
@@ -152,7 +153,7 @@ def _table(text: str) -> Course:
             if times and values["t"] <= times[-1]:
                 raise ConfigError(f"line {line}: t", values["t"], f"more than {times[-1]:g} before")
             times.append(values["t"])
-    return timed_course(poses, times, names)
+    return timed_course(poses, times, names, frame)
 
 
 def timed_course(

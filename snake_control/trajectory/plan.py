@@ -46,15 +46,13 @@ class Course:
     names: tuple[str, ...] = ()
 
 
-def course_through(
-    poses: ArrayLike, times: Sequence[float] = (), speed: float = 0.0, turning_speed: float = 0.0
-) -> Course:
-    """Return the course through poses in the world.
+def course_through(poses: ArrayLike, times: Sequence[float] = (), frame: str = "world") -> Course:
+    """Return the course through poses.
 
     Args:
         poses: [x, y, z, R, P, Y], (k, 6) [m, rad].
-        times: when to be there, counted from the start, rising [s]; none for ``speed``.
-        speed, turning_speed: without times [m/s, rad/s]; 0 for the configured ones.
+        times: when to be there, counted from the start, rising [s]; none for a speed.
+        frame: what they are relative to (``Settings.frame``).
 
     Raises:
         TrajectoryError: what cannot be.
@@ -69,19 +67,20 @@ def course_through(
         times_s=tuple(times) or None,
         names=tuple(f"pose {i}" for i in range(len(w))),
     )
-    return Course((part,), speeds(speed, turning_speed, "world"))
+    return Course((part,), Settings(frame=frame))
 
 
-def speeds(speed: float, turning_speed: float, frame: str) -> Settings:
-    """Return settings with speeds of which 0 means that nobody said it.
+def at_speed(course: Course, speed: float, turning_speed: float) -> Course:
+    """Return a course with speeds for those segments that say nothing; 0 is no speed, either.
 
     Raises:
-        TrajectoryError: a negative one, or none at all.
+        TrajectoryError: a speed that is none.
     """
     for name, value in (("speed", speed), ("turning_speed", turning_speed)):
         if not 0.0 <= value < np.inf:
             raise TrajectoryError(f"{name} is {value}: give more than 0, or 0 for the default")
-    return Settings(frame=frame, speed_m_s=speed or None, turning_speed_rad_s=turning_speed or None)
+    said = Settings(speed_m_s=speed or None, turning_speed_rad_s=turning_speed or None)
+    return dataclasses.replace(course, settings=course.settings.over(said))
 
 
 class _Part(NamedTuple):

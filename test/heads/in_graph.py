@@ -25,7 +25,7 @@ from snake_interfaces.msg import ControllerState, HeadReference
 from snake_control.control.reference import Reference
 from snake_control.nodes import topics
 from snake_control.nodes.conversions import pose_array, pose_message, reference_message, stamp_ns
-from support.head_action_client import HeadActionClient
+from support.head_client import HeadClient
 from support.head_trajectories import HOSTILE_KINDS, KINDS, feasible, hostile
 from support.whole_graph import WholeGraph
 
@@ -50,7 +50,7 @@ class Campaign:
     def __init__(self, robot: WholeGraph) -> None:
         """Take over a robot that waits for a reference."""
         self._robot, self._graph = robot, robot.graph
-        self._client = HeadActionClient(robot)
+        self._client = HeadClient(robot)
         self._reference: Callable[[float], Reference] | None = None
         self._since = 0
         t = topics.HEAD_REFERENCE

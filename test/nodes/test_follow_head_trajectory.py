@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
-
 import numpy as np
 import pytest
 from action_msgs.msg import GoalStatus
@@ -11,8 +9,8 @@ from builtin_interfaces.msg import Duration
 from snake_interfaces.action import FollowHeadTrajectory
 
 from snake_control.nodes import topics
-from snake_control.nodes.conversions import array, stamp_ns
-from support.head_action_client import HeadActionClient
+from snake_control.nodes.conversions import array
+from support.head_client import HeadClient, jumps
 from support.whole_graph import WholeGraph
 
 Result = FollowHeadTrajectory.Result
@@ -26,21 +24,7 @@ def robot(tmp_path_factory):
 
 @pytest.fixture
 def client(robot):
-    return HeadActionClient(robot)
-
-
-def jumps(robot: WholeGraph) -> float:
-    """Largest step of the reference beyond what its twist explains [m]."""
-    messages = robot.references.messages
-    worst = 0.0
-    for a, b in itertools.pairwise(messages):
-        dt = (stamp_ns(b) - stamp_ns(a)) * 1e-9
-        if dt > 0.1:
-            continue
-        step = array(b.pose.position) - array(a.pose.position)
-        fastest = max(np.linalg.norm(array(m.twist.linear)) for m in (a, b))
-        worst = max(worst, float(np.linalg.norm(step)) - (fastest * dt + 5e-4))
-    return worst
+    return HeadClient(robot)
 
 
 def test_the_head_goes_through_the_poses_and_tells_how_far_it_is(robot, client):
@@ -87,11 +71,7 @@ def test_what_cannot_be_is_told_and_nothing_moves(robot, client, way, more, code
 def test_a_canceled_goal_slows_down_to_rest(robot, client):
     robot.references.clear()
     handle = client.send(client.poses((0.2, 0, 0, 0, 0, 0)), speed=0.03, skip_rehearsal=True)
-    client.graph.wait_for(
-        lambda: any(f.phase == "moving" and f.progress > 0.1 for f in client.feedback),
-        30.0,
-        "motion",
-    )
+    client.wait_moving()
     canceled = handle.cancel_goal_async()
     client.graph.wait_for(canceled.done, 10.0, "the answer to the cancellation")
     status, result = client.result()
@@ -104,12 +84,8 @@ def test_a_canceled_goal_slows_down_to_rest(robot, client):
 def test_a_newer_goal_takes_over_without_a_jump(robot, client):
     robot.references.clear()
     client.send(client.poses((0.2, 0, 0, 0, 0, 0)), speed=0.03, skip_rehearsal=True)
-    first = client._result
-    client.graph.wait_for(
-        lambda: any(f.phase == "moving" and f.progress > 0.1 for f in client.feedback),
-        30.0,
-        "motion",
-    )
+    first = client.goal
+    client.wait_moving()
     status, result = client.follow(
         client.poses((0.02, 0.0, 0, 0, 0, 0)), speed=0.02, skip_rehearsal=True
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 from snake_control.config import TrajectoryGeneratorConfig
 from snake_control.control.reference import Reference
 from snake_control.errors import TrajectoryError
-from snake_control.trajectory.plan import Course, Plan, course_through
+from snake_control.trajectory.plan import Course, Plan, at_speed, course_through
 from snake_control.trajectory.segments import (
     Arc,
     Eight,
@@ -127,18 +128,25 @@ def test_a_refusal_names_the_segment(segment: Segment, words: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("given", "words"),
-    [
-        ({"poses": np.empty((0, 6))}, "no poses"),
-        ({"poses": ahead(0.1, 0.2), "times": [1.0]}, "1 times for 2 poses"),
-        ({"poses": ahead(0.1), "speed": -1.0}, "speed is -1.0"),
-        ({"poses": ahead(0.1), "turning_speed": math.nan}, "turning_speed is nan"),
-        ({"poses": ahead(0.1), "speed": 0.5}, "speed_m_s = 0.5: at most max_linear_speed_m_s"),
-    ],
+    ("poses", "times", "words"),
+    [(np.empty((0, 6)), [], "no poses"), (ahead(0.1, 0.2), [1.0], "1 times for 2 poses")],
 )
-def test_wrong_goals_are_refused(given: dict, words: str) -> None:
+def test_wrong_poses_are_refused(poses: np.ndarray, times: list[float], words: str) -> None:
     with pytest.raises(TrajectoryError, match=words):
-        Plan(CONFIG, course_through(**given), REST)
+        course_through(poses, times)
+
+
+def test_a_speed_from_outside_counts_where_nobody_said_one() -> None:
+    course = course_through(ahead(0.1))
+    assert Plan(CONFIG, at_speed(course, 0.02, 0.0), REST).duration == pytest.approx(7.0)
+    said = dataclasses.replace(course, settings=Settings(frame="world", speed_m_s=0.01))
+    assert Plan(CONFIG, at_speed(said, 0.02, 0.0), REST).duration == pytest.approx(11.0)
+    for speed, turning, words in (
+        (-1.0, 0.0, "speed is -1.0"),
+        (0.0, math.nan, "turning_speed is"),
+    ):
+        with pytest.raises(TrajectoryError, match=words):
+            at_speed(course, speed, turning)
 
 
 @pytest.mark.parametrize("tight", [Arc(radius_m=0.08, angle_rad=1.1), WholeCircle(radius_m=0.11)])
