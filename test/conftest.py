@@ -22,6 +22,7 @@ _ANY_TIME = (
     "nodes/test_bus_decision.py",
     "nodes/test_bus_driver_parts.py",
     "nodes/test_conversions.py",
+    "nodes/test_head_messages.py",
     "nodes/test_inputs.py",
     "nodes/test_layouts.py",
     "nodes/test_markers.py",

@@ -46,6 +46,7 @@ _STOPS = (
     ControllerState.STATUS_ERROR_TOO_LARGE,
     ControllerState.STATUS_STOPPED,
 )
+_REFUSALS = (Status.INVALID, Status.NO_HEAD, Status.UNREACHABLE)
 _REHEARSAL_HZ = 25.0
 _INPUT_WAIT_S = 1.0
 """How long a request waits for head pose and joint states that have just gone stale."""
@@ -423,7 +424,11 @@ class HeadMotion:
         status = self._status_of(run, around)
         status.code, status.text = code, text
         self._status.publish(status)
-        self._node.get_logger().info(f"{run.request.source} ended: {text}")
+        words = f"{run.request.source} ended: {text}"
+        if code in _REFUSALS:
+            self._node.get_logger().warning(words)
+        else:
+            self._node.get_logger().info(words)
         if not run.begun.done():
             run.begun.set_result(Outcome(False, text))
         run.request.on_status(status)

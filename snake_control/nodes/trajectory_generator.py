@@ -1,10 +1,10 @@
 """Node ``trajectory_generator``: sends ``head/reference`` for a trajectory or for ``cmd_vel``.
 
-Nothing is sent before ``~/start`` (or the parameter ``autostart``), ``~/return``, ``cmd_vel`` or a
-goal of the action ``follow_head_trajectory``. ``~/stop``, or ``cmd_vel`` that ceases, brings the
-reference to rest; then it is no longer sent, and the controller reports a stale reference and
-commands zero. ``cmd_vel`` takes over from whatever is being followed, unless it is zero: a joystick
-at rest starts and takes over nothing.
+Nothing is sent before ``~/start`` (or the parameter ``autostart``), ``~/return``, ``cmd_vel``,
+``head/path``, ``head/trajectory`` or a goal of the action ``follow_head_trajectory``. ``~/stop``,
+or ``cmd_vel`` that ceases, brings the reference to rest; then it is no longer sent, and the
+controller reports a stale reference and commands zero. ``cmd_vel`` takes over from whatever is
+being followed, unless it is zero: a joystick at rest starts and takes over nothing.
 
 ``controller_state`` says how fast the reference may go on (``reference_scale``): near a limit of
 the robot it slows down, and it waits while the controller does not follow. Where no controller is
@@ -17,6 +17,8 @@ clock that is set moves nothing.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -47,6 +49,7 @@ from snake_control.nodes.conversions import (
     stamp_ns,
 )
 from snake_control.nodes.head_action import HeadAction
+from snake_control.nodes.head_messages import MessageMotion, path_motion, trajectory_motion
 from snake_control.nodes.head_motion import HeadMotion, Movable, Request, Surroundings
 from snake_control.nodes.inputs import FUTURE_TOLERANCE_S, Input
 from snake_control.nodes.parameters import NodeParameters
@@ -91,6 +94,13 @@ class TrajectoryGenerator(Node):
         )
         self._motion = HeadMotion(self, configured, self._sequence, self._publish_plan)
         self._action = HeadAction(self, self._motion, config.frame_id, self._steady_s)
+        for t, convert in (
+            (topics.HEAD_PATH, path_motion),
+            (topics.HEAD_TRAJECTORY, trajectory_motion),
+        ):
+            self.create_subscription(
+                t.type, t.name, partial(self._on_motion, t.name, convert), t.qos
+            )
 
         t = topics.HEAD_REFERENCE
         self._reference = self.create_publisher(t.type, t.name, t.qos)
@@ -185,6 +195,21 @@ class TrajectoryGenerator(Node):
             return ConfiguredPlan(config, start.w_d)
 
         return _answer(response, await self._motion.preview(plan, self._steady_s()))
+
+    def _on_motion(self, source: str, convert: Callable[..., MessageMotion], message: Any) -> None:
+        """Ask for the motion in a message of head/path or head/trajectory."""
+        self._autostart = False
+        now, config = self._steady_s(), self._config
+        motion = convert(message, self._now(), config.stamp_tolerance_s, config.frame_id)
+        self._motion.ask(
+            Request(
+                source,
+                lambda t: motion.course(t - now),
+                is_dated=motion.is_dated,
+                begins_at=now + motion.wait_s,
+            ),
+            now,
+        )
 
     def _on_stop(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         now = self._now()

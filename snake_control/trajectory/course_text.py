@@ -17,7 +17,7 @@ from snake_control.config.yaml_file import parse_yaml, read_text
 from snake_control.control.head_filter import QUATERNION_TOLERANCE
 from snake_control.errors import ConfigError, ConfigFileError
 from snake_control.model.rotation import rpy_from_quaternion
-from snake_control.trajectory.plan import Course
+from snake_control.trajectory.plan import Course, timed_course
 from snake_control.trajectory.segments import SEGMENTS, Line, Poses, Segment, Settings
 
 MOST_POSES = 20000
@@ -154,34 +154,6 @@ def _table(text: str, frame: str) -> Course:
                 raise ConfigError(f"line {line}: t", values["t"], f"more than {times[-1]:g} before")
             times.append(values["t"])
     return timed_course(poses, times, names, frame)
-
-
-def timed_course(
-    poses: list[tuple[float, ...]],
-    times: list[float],
-    names: list[str],
-    frame: str = "world",
-) -> Course:
-    """Return the way to a first pose, and then through the others at their times or at a speed.
-
-    Args:
-        poses: 6 numbers each [m, rad].
-        times: when to be there, rising [s], the first one being when the head leaves the first
-            pose; empty for a speed.
-        names: what to call each pose.
-        frame: what the poses are relative to (``Settings.frame``).
-    """
-    at = Settings(frame=frame)
-    first = Line(to=poses[0], settings=at)
-    if len(poses) == 1:
-        return Course((first,), names=(names[0],))
-    then = Poses(
-        poses=tuple(poses),
-        times_s=tuple(t - times[0] for t in times) if times else None,
-        names=tuple(names),
-        settings=at,
-    )
-    return Course((first, then), names=(f"on the way to {names[0]}", ""))
 
 
 def _numbered(text: str) -> list[tuple[int, list[str]]]:

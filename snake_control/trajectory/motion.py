@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bisect
 from collections.abc import Sequence
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -47,6 +47,14 @@ class Motion(Protocol):
 
     def moments(self) -> Array:
         """Return times at which to look for the largest speeds, (k,) [s]."""
+
+
+@runtime_checkable
+class ManyAtOnce(Protocol):
+    """A motion with many poses, which overlaps with no other."""
+
+    def many(self, t: Array) -> Array:
+        """Return pose, rate and acceleration at times (k,) inside it, (3, k, 6)."""
 
 
 class Rest:
@@ -157,6 +165,21 @@ class Chain:
                 found.append(np.linspace(begin, end, _SAMPLES_OF_A_JOIN))
         return np.unique(np.concatenate(found))
 
+    def profile(self) -> Profile:
+        """Return it at its ``moments``."""
+        t = self.moments()
+        rows = np.empty((3, len(t), 6))
+        one_by_one = np.ones(len(t), dtype=bool)
+        for motion, begin, end in zip(self._motions, self.begins, self._ends, strict=True):
+            if isinstance(motion, ManyAtOnce):
+                inside = (t > begin) & (t < end)
+                rows[:, inside] = motion.many(t[inside] - begin)
+                one_by_one &= ~inside
+        for i in np.flatnonzero(one_by_one).tolist():
+            seen = self.sample(float(t[i]))
+            rows[:, i] = seen.w_d, seen.w_d_dot, seen.w_d_ddot
+        return Profile(t, *rows)
+
 
 class Started:
     """A motion that starts at some time of a clock."""
@@ -169,20 +192,3 @@ class Started:
     def sample(self, t: float) -> Reference:
         """Return pose, rate and acceleration at time ``t`` [s]."""
         return self._motion.sample(t - self._start)
-
-
-def profile(motion: Motion, t: Array | None = None) -> Profile:
-    """Return a motion at given times, or where its largest speeds are.
-
-    Args:
-        motion: which.
-        t: times, (k,) [s].
-    """
-    t = motion.moments() if t is None else t
-    seen = [motion.sample(x) for x in t.tolist()]
-    return Profile(
-        t,
-        np.array([s.w_d for s in seen]),
-        np.array([s.w_d_dot for s in seen]),
-        np.array([s.w_d_ddot for s in seen]),
-    )

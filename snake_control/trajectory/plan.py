@@ -12,12 +12,13 @@ from numpy.typing import ArrayLike, NDArray
 from snake_control.config import TrajectoryGeneratorConfig
 from snake_control.control.reference import Reference
 from snake_control.errors import SnakeError, TrajectoryError
-from snake_control.trajectory.motion import Braking, Chain, Motion, Profile, Started, profile
+from snake_control.trajectory.motion import Braking, Chain, Motion, Profile, Started
 from snake_control.trajectory.motion_limits import PITCH_LIMIT_RAD
 from snake_control.trajectory.segments import (
     BLEND,
     NOTHING_SAID,
     REST,
+    Line,
     Place,
     Poses,
     Segment,
@@ -46,28 +47,80 @@ class Course:
     names: tuple[str, ...] = ()
 
 
-def course_through(poses: ArrayLike, times: Sequence[float] = (), frame: str = "world") -> Course:
+def course_through(
+    poses: ArrayLike,
+    times: Sequence[float] = (),
+    frame: str = "world",
+    rates: ArrayLike | None = None,
+    what: str = "pose",
+) -> Course:
     """Return the course through poses.
 
     Args:
         poses: [x, y, z, R, P, Y], (k, 6) [m, rad].
         times: when to be there, counted from the start, rising [s]; none for a speed.
         frame: what they are relative to (``Settings.frame``).
+        rates: of the poses in the world, (k, 6) [m/s, rad/s], where they are known.
+        what: what to call one of them.
 
     Raises:
         TrajectoryError: what cannot be.
     """
+    rows = _rows(poses)
+    if times and len(times) != len(rows):
+        raise TrajectoryError(f"{len(times)} times for {len(rows)} poses: give one for each")
+    part = Poses(
+        poses=rows,
+        times_s=tuple(times) or None,
+        rates=None if rates is None else _rows(rates),
+        names=tuple(f"{what} {i}" for i in range(len(rows))),
+    )
+    return Course((part,), Settings(frame=frame))
+
+
+def timed_course(
+    poses: ArrayLike,
+    times: Sequence[float],
+    names: Sequence[str],
+    frame: str = "world",
+    rates: ArrayLike | None = None,
+    lead_s: float | None = None,
+) -> Course:
+    """Return the way to a first pose, and from rest there through the others.
+
+    Args:
+        poses: [x, y, z, R, P, Y], (k, 6) [m, rad].
+        times: when to be there, rising [s], the first one being when the head leaves the first
+            pose; empty for a speed.
+        names: what to call each pose.
+        frame: what the poses are relative to (``Settings.frame``).
+        rates: of the poses in the world, (k, 6) [m/s, rad/s], where they are known.
+        lead_s: how long the way to the first pose shall take [s]; ``None`` for a speed.
+
+    Raises:
+        TrajectoryError: no poses.
+    """
+    rows, settings = _rows(poses), Settings(frame=frame)
+    first: Segment = Line(to=rows[0], settings=settings)
+    if lead_s is not None:
+        first = Poses(poses=rows[:1], times_s=(lead_s,), names=(names[0],), settings=settings)
+    if len(rows) == 1:
+        return Course((first,), names=(names[0],))
+    then = Poses(
+        poses=rows,
+        times_s=tuple(t - times[0] for t in times) or None,
+        rates=None if rates is None else _rows(rates),
+        names=tuple(names),
+        settings=settings,
+    )
+    return Course((first, then), names=(f"on the way to {names[0]}", ""))
+
+
+def _rows(poses: ArrayLike) -> tuple[tuple[float, ...], ...]:
     w = np.reshape(np.asarray(poses, dtype=float), (-1, 6))
     if not len(w):
         raise TrajectoryError("no poses: give one or more")
-    if times and len(times) != len(w):
-        raise TrajectoryError(f"{len(times)} times for {len(w)} poses: give one for each")
-    part = Poses(
-        poses=tuple(tuple(row) for row in w.tolist()),
-        times_s=tuple(times) or None,
-        names=tuple(f"pose {i}" for i in range(len(w))),
-    )
-    return Course((part,), Settings(frame=frame))
+    return tuple(tuple(row) for row in w.tolist())
 
 
 def at_speed(course: Course, speed: float, turning_speed: float) -> Course:
@@ -146,7 +199,7 @@ class Plan:
             for part in zip(names, course.segments, motions, course_alone.begins, strict=True)
         ]
         self._late = 0.0
-        seen = profile(course_alone)
+        seen = course_alone.profile()
         self._check(seen)
         self.length = float(np.linalg.norm(np.diff(seen.w[:, :3], axis=0), axis=1).sum())
         self._motion = course_alone

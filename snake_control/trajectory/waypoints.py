@@ -77,6 +77,10 @@ class Waypoints:
         between = np.linspace(x[:-1], x[1:], each, endpoint=False).ravel()
         return np.union1d(between, x)
 
+    def many(self, t: Array) -> Array:
+        """Return pose, rate and acceleration at times (k,) since its start, (3, k, 6)."""
+        return np.array([self._spline(t, order) for order in (0, 1, 2)])
+
     def sample(self, t: float) -> Reference:
         """Return pose, rate and acceleration at time ``t`` [s]."""
         at = t - self._start

@@ -13,13 +13,14 @@ from std_srvs.srv import Trigger
 
 from snake_control.nodes import topics
 from snake_control.nodes.conversions import array, pose_message, stamp_ns
+from support.perfect_head import PerfectHead
 from support.whole_graph import WholeGraph
 
 
 class HeadClient:
     """Sends goals, calls services, and keeps feedback and status."""
 
-    def __init__(self, robot: WholeGraph) -> None:
+    def __init__(self, robot: WholeGraph | PerfectHead) -> None:
         self.robot, self.graph = robot, robot.graph
         action = topics.FOLLOW_HEAD_TRAJECTORY
         self._client = ActionClient(self.graph.node, action.type, action.name)
@@ -79,7 +80,7 @@ class HeadClient:
         )
 
 
-def jumps(robot: WholeGraph) -> float:
+def jumps(robot: WholeGraph | PerfectHead) -> float:
     """Largest step of the reference beyond what its twist explains [m]."""
     messages = robot.references.messages
     worst = 0.0
@@ -93,6 +94,6 @@ def jumps(robot: WholeGraph) -> float:
     return worst
 
 
-def travelled(robot: WholeGraph) -> NDArray[np.float64]:
+def travelled(robot: WholeGraph | PerfectHead) -> NDArray[np.float64]:
     """Positions of the references received, (k, 3) [m]."""
     return np.array([array(message.pose.position) for message in robot.references.messages])
