@@ -13,6 +13,7 @@ NODES = (
     "keyboard_teleop",
     "description",
     "record",
+    "head_trajectory",
     "mock_bus",
 )
 COMMANDS = ("demo", "evaluate", "experiment", "layouts", "recording", "scp_study")

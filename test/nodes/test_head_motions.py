@@ -14,18 +14,21 @@ from snake_interfaces.action import FollowHeadTrajectory
 from snake_interfaces.msg import HeadTrajectoryStatus
 from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
 
-from snake_control.nodes import topics
+from snake_control.nodes import head_trajectory, topics
 from snake_control.nodes.conversions import (
+    array,
     header,
     pose_array,
     pose_message,
     stamp_ns,
     vector,
 )
+from support.graph import Graph
 from support.head_client import HeadClient, jumps, travelled
 from support.perfect_head import PerfectHead
 
 NODE = "trajectory_generator"
+TOOL = "snake_control.nodes.head_trajectory"
 Result = FollowHeadTrajectory.Result
 Status = HeadTrajectoryStatus
 
@@ -220,3 +223,57 @@ def test_stamps_of_a_path_are_kept_and_past_ones_refused(robot, client):
     # A busy machine loses time, which is not made up for; but none is gained.
     late_s = (stamp_ns(arriving[0]) - stamp_ns(message.poses[-1])) * 1e-9
     assert -0.1 <= late_s < 3.0
+
+
+def test_the_command_follows_a_file_and_says_how_it_ended(robot, tmp_path):
+    def run(text: str, *arguments: str, name: str = "motion.yaml"):
+        file = tmp_path / name
+        file.write_text(text)
+        process = robot.graph.run(TOOL, [str(file), *arguments])
+        process.let_end()
+        return process
+
+    begin = robot.w
+    process = run("[{line: {by: [0.01, 0, 0]}}, return_to_start]", "--speed", "0.03")
+    assert process.wait(60.0) == 0, process.output()
+    output = process.output()
+    assert "moving" in output
+    assert "100 %" in output
+    assert "arrived; the head is" in output
+    np.testing.assert_allclose(robot.w[:3], begin[:3], atol=0.012)
+
+    process = run("x,y,z,roll,pitch,yaw\n0,0,0.4,0,0,0", "--frame", "link_1", name="up.csv")
+    assert process.wait(60.0) == 1
+    assert "line 2: " in process.output()
+    assert "would hold it up after" in process.output()
+
+    robot.references.clear()
+    process = run("[{line: {by: [0.2, 0, 0], speed_m_s: 0.03}}]", "--skip-rehearsal")
+    robot.graph.wait_for(
+        lambda: robot.references.last and robot.references.last.twist.linear.x > 0.02,
+        40.0,
+        "full speed",
+    )
+    process.interrupt()
+    assert process.wait(20.0) == 1
+    assert "canceling" in process.output()
+    assert "canceled; the head is" in process.output()
+    assert np.linalg.norm(array(robot.references.last.twist.linear)) < 1e-3
+    assert jumps(robot) <= 0.0
+
+
+def test_the_command_refuses_a_wrong_file(tmp_path, capsys):
+    file = tmp_path / "motion.yaml"
+    file.write_text("[{line: {by: [1]}}]")
+    assert head_trajectory.main(["head_trajectory", str(file)]) == 2
+    assert f"{file}: segment 1 (line): by = [1.0]: give 3 numbers" in capsys.readouterr().err
+
+
+def test_the_command_gives_up_without_a_generator(tmp_path):
+    file = tmp_path / "motion.yaml"
+    file.write_text(THERE_AND_BACK)
+    with Graph() as graph:
+        process = graph.run(TOOL, [str(file), "--wait", "0.5"])
+        process.let_end()
+        assert process.wait(20.0) == 1
+        assert "is trajectory_generator running?" in process.output()

@@ -18,6 +18,7 @@ NODES = {
     "keyboard_teleop",
     "description",
     "record",
+    "head_trajectory",
     "mock_bus",
 }
 COMMANDS = {"ax12", "demo", "evaluate", "experiment", "layouts", "recording", "scp_study"}
