@@ -20,6 +20,9 @@ SLOWEST = 1.5
 """A motion that takes more than so many times as long as planned is not what was asked for."""
 
 _FAR_M, _FAR_RAD = 0.03, 0.2
+_STUCK_S = 15.0
+"""A motion that has stood still for so long is not waited for any more."""
+_STANDS_STILL = 0.01
 
 
 @dataclasses.dataclass(frozen=True)
@@ -65,10 +68,15 @@ def rehearse(
     worst: dict[Limit, GuidedSample] = {}
     error_m = error_rad = 0.0
     late: GuidedSample | None = None
+    moved_at, moved_own = 0.0, 0.0
     sample = None
     for sample in robot.follow(reference, duration, SLOWEST * duration):
         if given_up():
             return Rehearsal(False, "given up", 0.0, 0.0, 0.0)
+        if sample.own_t > moved_own + _STANDS_STILL * (sample.t - moved_at):
+            moved_at, moved_own = sample.t, sample.own_t
+        elif sample.t - moved_at > _STUCK_S:
+            break
         result = sample.result
         if result is None:
             where = _where(sample, duration)
