@@ -27,6 +27,7 @@ _ANY_TIME = (
     "nodes/test_layouts.py",
     "nodes/test_markers.py",
     "nodes/test_message_definitions.py",
+    "nodes/test_pose_sources.py",
 )
 """Of these folders, what does not mind waiting."""
 

@@ -14,12 +14,12 @@ from snake_control.config.nodes import (
     DescriptionConfig,
     KeyboardTeleopConfig,
     MockBusConfig,
-    PoseInputConfig,
     RecordConfig,
     ScpControllerConfig,
     TrajectoryGeneratorConfig,
 )
 from snake_control.config.parameter import Parameter, parameters
+from snake_control.config.pose_input import PoseInputConfig
 from snake_control.config.robot import RobotConfig, ServosConfig
 from snake_control.config.supervisor import SupervisorConfig
 from snake_control.config.yaml_file import matches, read_sections

@@ -159,20 +159,6 @@ class BusDriverConfig:
 
 
 @dataclasses.dataclass(frozen=True)
-class PoseInputConfig:
-    """Parameters of the node ``pose_input``."""
-
-    frame_id: str = parameter("world", "frame in which the head pose is published")
-    child_frame_id: str = parameter("link_1", "frame of the head, origin at its tip")
-    cutoff_hz: float = parameter(
-        3.0, "bandwidth of the filter that yields pose and twist", low=0.1, high=100.0
-    )
-    timeout_s: float = parameter(
-        0.1, "without a pose this fresh the head pose is not valid [s]", low=0.01, high=10.0
-    )
-
-
-@dataclasses.dataclass(frozen=True)
 class ScpControllerConfig:
     """Parameters of the node ``scp_controller`` beside the shared groups."""
 

@@ -14,6 +14,13 @@ with ``d = g (4 - 2 g - h)``. With 3 Hz and 100 poses per second these are 0.30 
 
 The attitude is filtered the same way: the error is the rotation vector, in the world, from
 predicted to measured attitude, and the rate is the angular velocity in the world.
+
+The covariance of the estimate follows the filter through each step, whatever gains it had: with
+errors ``e_p`` and ``e_v`` of pose and rate before, and ``n`` of the measurement,
+
+    e_p' = (1 - g) (e_p + dt e_v) + g n,    e_v' = e_v + h / dt (n - e_p - dt e_v).
+
+It comes down to the figures above. What the filter lags behind an acceleration is not in it.
 """
 
 from __future__ import annotations
@@ -45,6 +52,18 @@ class Reason(enum.Enum):
     TOO_FAR = "too far from the origin"
     NOT_A_ROTATION = "its quaternion is not of length 1"
     OUT_OF_ORDER = "not newer than the pose before"
+    UNSTAMPED = "no time of capture"
+    AHEAD_OF_CLOCK = "stamped ahead of this computer's clock"
+    WRONG_FRAME = "of another frame"
+    NOT_TRACKED = "the body was not seen"
+    REPEATED = "the pose before once more"
+    FROZEN = "the same pose for too long"
+    JUMP = "further from the last pose than the head can have moved"
+
+    @property
+    def is_fault(self) -> bool:
+        """Whether it speaks against the source, and not only against this pose."""
+        return self not in (Reason.OUT_OF_ORDER, Reason.REPEATED)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -70,6 +89,9 @@ class HeadEstimate:
         rotation: attitude of the head in the world.
         velocity: of the tip in the world, shape (3,) [m/s].
         angular_velocity: of the head, in the world, shape (3,) [rad/s].
+        pose_covariance: of position and small turns about the axes of the world, shape (6, 6)
+            [m^2, m rad, rad^2].
+        twist_covariance: of velocity and angular velocity in the world, shape (6, 6).
     """
 
     stamp_ns: int
@@ -77,6 +99,8 @@ class HeadEstimate:
     rotation: Rotation
     velocity: Array
     angular_velocity: Array
+    pose_covariance: Array = dataclasses.field(default_factory=lambda: np.zeros((6, 6)))
+    twist_covariance: Array = dataclasses.field(default_factory=lambda: np.zeros((6, 6)))
 
     @property
     def is_finite(self) -> bool:
@@ -100,17 +124,30 @@ def gains(cutoff_hz: float, dt: float) -> tuple[float, float]:
 class HeadFilter:
     """Estimates pose and velocity of the head from stamped, noisy, possibly faulty poses."""
 
-    def __init__(self, cutoff_hz: float, timeout_s: float) -> None:
+    def __init__(
+        self,
+        cutoff_hz: float,
+        timeout_s: float,
+        max_speed_m_s: float = 0.0,
+        max_turning_rad_s: float = 0.0,
+    ) -> None:
         """Create the filter without an estimate.
 
         Args:
             cutoff_hz: -3 dB frequency from measured to estimated position.
             timeout_s: after a gap longer than this the motion before it says nothing any more:
                 the estimate starts anew from the next pose, at rest.
+            max_speed_m_s, max_turning_rad_s: what it may in truth be doing then; twice the
+                standard deviation of the rate that it starts with.
         """
         self._cutoff_hz = cutoff_hz
         self._timeout_ns = round(timeout_s * 1e9)
+        self._start_twist = np.diag(
+            np.square(np.repeat([0.5 * max_speed_m_s, 0.5 * max_turning_rad_s], 3))
+        )
         self._estimate: HeadEstimate | None = None
+        # Covariance of the errors of pose and rate with each other.
+        self._cross = np.zeros((6, 6))
 
     @property
     def estimate(self) -> HeadEstimate | None:
@@ -122,7 +159,11 @@ class HeadFilter:
         self._estimate = None
 
     def update(
-        self, stamp_ns: int, position: ArrayLike, quaternion: ArrayLike
+        self,
+        stamp_ns: int,
+        position: ArrayLike,
+        quaternion: ArrayLike,
+        covariance: Array | None = None,
     ) -> HeadEstimate | Rejection:
         """Take one measured pose.
 
@@ -130,29 +171,24 @@ class HeadFilter:
             stamp_ns: time of capture [ns].
             position: of the tip in the world, shape (3,) [m].
             quaternion: attitude of the head in the world, [x, y, z, w].
+            covariance: of position and small turns about the axes of the world, shape (6, 6)
+                [m^2, m rad, rad^2]; none for a measurement without noise.
 
         Returns:
             The estimate at ``stamp_ns``, or why the pose was not used (the estimate then stays).
         """
         z = np.asarray(position, dtype=float)
         xyzw = np.asarray(quaternion, dtype=float)
-        if not (np.isfinite(z).all() and np.isfinite(xyzw).all()):
-            return Rejection(
-                Reason.NOT_FINITE, f"pose is not finite: position {z}, quaternion {xyzw}"
-            )
-        if np.abs(z).max() > MAX_DISTANCE_M:
-            return Rejection(
-                Reason.TOO_FAR, f"position {z} is beyond {MAX_DISTANCE_M:g} m from the origin"
-            )
-        norm = float(np.linalg.norm(xyzw))
-        if abs(norm - 1.0) > QUATERNION_TOLERANCE:
-            return Rejection(
-                Reason.NOT_A_ROTATION, f"quaternion has length {norm:.3g}, it must be 1"
-            )
+        if rejection := unusable(z, xyzw):
+            return rejection
         measured = Rotation.from_quat(xyzw)
+        noise = np.zeros((6, 6)) if covariance is None else covariance
         before = self._estimate
         if before is None or stamp_ns - before.stamp_ns > self._timeout_ns:
-            self._estimate = HeadEstimate(stamp_ns, z.copy(), measured, np.zeros(3), np.zeros(3))
+            self._cross = np.zeros((6, 6))
+            self._estimate = HeadEstimate(
+                stamp_ns, z.copy(), measured, np.zeros(3), np.zeros(3), noise, self._start_twist
+            )
             return self._estimate
         dt = (stamp_ns - before.stamp_ns) * 1e-9
         if dt <= 0:
@@ -164,15 +200,54 @@ class HeadFilter:
         residual = z - predicted
         predicted_rotation = Rotation.from_rotvec(before.angular_velocity * dt) * before.rotation
         rotation_residual = (measured * predicted_rotation.inv()).as_rotvec()
+        of_pose, cross, of_twist = self._covariances(before, g, h, dt, noise)
         estimate = HeadEstimate(
             stamp_ns=stamp_ns,
             position=predicted + g * residual,
             rotation=Rotation.from_rotvec(g * rotation_residual) * predicted_rotation,
             velocity=before.velocity + h / dt * residual,
             angular_velocity=before.angular_velocity + h / dt * rotation_residual,
+            pose_covariance=of_pose,
+            twist_covariance=of_twist,
         )
         if not estimate.is_finite:
             self.reset()
             return Rejection(Reason.NOT_FINITE, "the filter lost its numbers and starts anew")
-        self._estimate = estimate
+        self._estimate, self._cross = estimate, cross
         return estimate
+
+    def _covariances(
+        self, before: HeadEstimate, g: float, h: float, dt: float, noise: Array
+    ) -> tuple[Array, Array, Array]:
+        """Covariances after a step: of the pose, of pose and rate with each other, of the rate."""
+        pp, pv, vv = before.pose_covariance, self._cross, before.twist_covariance
+        vp = pv.T
+        a, b = 1 - g, (1 - g) * dt
+        c, d = -h / dt, 1 - h
+        k = h / dt
+        return (
+            a * a * pp + a * b * (pv + vp) + b * b * vv + g * g * noise,
+            a * c * pp + a * d * pv + b * c * vp + b * d * vv + g * k * noise,
+            c * c * pp + c * d * (pv + vp) + d * d * vv + k * k * noise,
+        )
+
+
+def unusable(position: Array, quaternion: Array) -> Rejection | None:
+    """Return why these seven numbers are no pose, ``None`` if they are one.
+
+    Args:
+        position: shape (3,) [m].
+        quaternion: [x, y, z, w].
+    """
+    if not (np.isfinite(position).all() and np.isfinite(quaternion).all()):
+        return Rejection(
+            Reason.NOT_FINITE, f"pose is not finite: position {position}, quaternion {quaternion}"
+        )
+    if np.abs(position).max() > MAX_DISTANCE_M:
+        return Rejection(
+            Reason.TOO_FAR, f"position {position} is beyond {MAX_DISTANCE_M:g} m from the origin"
+        )
+    norm = float(np.linalg.norm(quaternion))
+    if abs(norm - 1.0) > QUATERNION_TOLERANCE:
+        return Rejection(Reason.NOT_A_ROTATION, f"quaternion has length {norm:.3g}, it must be 1")
+    return None

@@ -7,7 +7,7 @@ import math
 from collections.abc import Sequence
 
 from builtin_interfaces.msg import Time
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import JointState
 from snake_interfaces.msg import BusState, JointVelocityCommand, ServoState
 
@@ -15,6 +15,7 @@ from snake_control.ax12.driven_joint import JointReading
 from snake_control.ax12.health import Level, Verdict
 from snake_control.ax12.units import error_names
 from snake_control.nodes.bus_snapshot import Snapshot, State
+from snake_control.nodes.conversions import diagnostic_status
 
 _NS = 1_000_000_000
 _UNKNOWN = "no reading yet"
@@ -139,7 +140,7 @@ def no_diagnostics(port: str, stamp: Time) -> DiagnosticArray:
     """Return the one status of a driver that is not configured."""
     array = DiagnosticArray()
     array.header.stamp = stamp
-    array.status = [_status("bus_driver: bus", port, Level.STALE, "not configured", {})]
+    array.status = [diagnostic_status("bus_driver: bus", port, Level.STALE, "not configured", {})]
     return array
 
 
@@ -149,7 +150,7 @@ def diagnostics(snapshot: Snapshot, health: Health, port: str, stamp: Time) -> D
     array.header.stamp = stamp
     level = _STATE_LEVELS.get(snapshot.state, Level.OK)
     array.status = [
-        _status(
+        diagnostic_status(
             "bus_driver: bus",
             port,
             level,
@@ -171,7 +172,7 @@ def diagnostics(snapshot: Snapshot, health: Health, port: str, stamp: Time) -> D
     ):
         counters = reading.counters
         array.status.append(
-            _status(
+            diagnostic_status(
                 f"bus_driver: {reading.joint.name}",
                 f"AX-12 id {reading.joint.servo_id}",
                 verdict.level,
@@ -211,18 +212,6 @@ def _torque(reading: JointReading) -> str:
     if reading.shut_down:
         return "held back after an alarm"
     return "on" if reading.torque_on else "off"
-
-
-def _status(
-    name: str, hardware: str, level: Level, text: str, values: dict[str, str]
-) -> DiagnosticStatus:
-    return DiagnosticStatus(
-        level=bytes((level,)),
-        name=name,
-        message=text,
-        hardware_id=hardware,
-        values=[KeyValue(key=key, value=value) for key, value in values.items()],
-    )
 
 
 class InvalidCommandError(ValueError):

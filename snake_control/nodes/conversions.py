@@ -6,11 +6,12 @@ Whatever comes in is checked here: a ``MessageError`` says what is wrong with a 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from geometry_msgs.msg import Point, Pose, Quaternion, TwistStamped, Vector3
 from nav_msgs.msg import Odometry
 from numpy.typing import NDArray
@@ -150,6 +151,19 @@ def rpy_rates(rpy: Array, angular_velocity: Array) -> Array:
     return np.linalg.solve(rpy_rate_map(rpy), angular_velocity)
 
 
+def diagnostic_status(
+    name: str, hardware: str, level: int, text: str, values: Mapping[str, str]
+) -> DiagnosticStatus:
+    """Return one status of a diagnostics message; ``level`` as in DiagnosticStatus."""
+    return DiagnosticStatus(
+        level=bytes((level,)),
+        name=name,
+        message=text,
+        hardware_id=hardware,
+        values=[KeyValue(key=key, value=value) for key, value in values.items()],
+    )
+
+
 def odometry_message(estimate: HeadEstimate, frame_id: str, child_frame_id: str) -> Odometry:
     """Return a filtered head motion as a message: pose in the world, twist in the head's frame."""
     to_head = estimate.rotation.inv()
@@ -158,6 +172,9 @@ def odometry_message(estimate: HeadEstimate, frame_id: str, child_frame_id: str)
     message.pose.pose.orientation = quaternion(estimate.rotation.as_quat())
     message.twist.twist.linear = vector(to_head.apply(estimate.velocity))
     message.twist.twist.angular = vector(to_head.apply(estimate.angular_velocity))
+    turn = np.kron(np.eye(2), to_head.as_matrix())
+    message.pose.covariance = estimate.pose_covariance.ravel()
+    message.twist.covariance = (turn @ estimate.twist_covariance @ turn.T).ravel()
     return message
 
 

@@ -8,124 +8,194 @@ from __future__ import annotations
 import collections
 from typing import Any
 
-from geometry_msgs.msg import PoseStamped
 from rclpy.clock import Clock, ClockType
+from rclpy.event_handler import QoSRequestedIncompatibleQoSInfo, SubscriptionEventCallbacks
 from rclpy.node import Node
+from rclpy.qos import qos_policy_name_from_kind
+from rclpy.qos_overriding_options import QoSOverridingOptions
+from rclpy.subscription import Subscription
 from snake_interfaces.msg import PoseStatus
 
-from snake_control.control.head_filter import HeadFilter, Reason, Rejection
+from snake_control.control.head_filter import HeadEstimate, Rejection
+from snake_control.control.pose_intake import Measurement, PoseIntake
 from snake_control.nodes import topics
-from snake_control.nodes.conversions import array, header, odometry_message, stamp_ns
+from snake_control.nodes.conversions import odometry_message
 from snake_control.nodes.inputs import FUTURE_TOLERANCE_S
 from snake_control.nodes.parameters import NodeParameters
+from snake_control.nodes.pose_messages import (
+    NUMBER_OF_REASON,
+    Verdict,
+    diagnostics,
+    status_message,
+)
+from snake_control.nodes.pose_publishers import PublisherWatch, type_name
+from snake_control.nodes.pose_sources import Convert, Feed, feeds
 from snake_control.nodes.process import run
 
 _STATUS_PERIOD_S = 0.1
+_LOOK_PERIOD_S = 1.0
 _RATE_WINDOW_NS = 1_000_000_000
-_FUTURE_TOLERANCE_NS = round(FUTURE_TOLERANCE_S * 1e9)
+_NEWS_NS = 2_000_000_000
+"""How long the status tells what happened."""
 
 
 class PoseInput(Node):
-    """Filters ``mocap/pose``; a pose that is refused leads to no odometry, only to a status."""
+    """Filters measured poses; one that is refused leads to no odometry, only to a status."""
 
     def __init__(self, **overrides: Any) -> None:
+        """Subscribe to what the configuration names.
+
+        Raises:
+            ConfigError: a parameter that is not allowed, or messages that are not installed.
+        """
         super().__init__("pose_input", **overrides)
         self._config = NodeParameters(self, "pose_input").config.pose_input
         self._timeout_ns = round(self._config.timeout_s * 1e9)
+        self._diagnostics_ns = round(self._config.diagnostics_period_s * 1e9)
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._filter = HeadFilter(self._config.cutoff_hz, self._config.timeout_s)
-        self._accepted = self._rejected = self._out_of_order = 0
-        self._fault = ""
+        self._intake = PoseIntake(self._config, FUTURE_TOLERANCE_S)
+        self._fault: Rejection | None = None
         self._fault_ns = 0
+        self._news, self._news_ns = "", 0
         self._arrivals: collections.deque[int] = collections.deque()
-        self._published_status: int | None = None
-        self._frames_warned: set[str] = set()
+        self._published: Verdict | None = None
+        self._diagnosed: Verdict | None = None
+        self._diagnosed_ns = 0
 
         t = topics.HEAD_ODOMETRY
         self._odometry = self.create_publisher(t.type, t.name, t.qos)
         t = topics.HEAD_STATUS
         self._status = self.create_publisher(t.type, t.name, t.qos)
-        t = topics.MOCAP_POSE
-        self.create_subscription(t.type, t.name, self._on_pose, t.qos)
-        self.create_timer(_STATUS_PERIOD_S, self._publish_status, clock=self._steady)
+        t = topics.DIAGNOSTICS
+        self._diagnostics = self.create_publisher(t.type, t.name, t.qos)
+        first, *others = feeds(self._config)
+        self._senders = PublisherWatch(self, type_name(first.topic.type))
+        self._subscription = self._subscribe(first)
+        for feed in others:
+            self._subscribe(feed)
+        self.create_timer(_STATUS_PERIOD_S, self._report, clock=self._steady)
+        self.create_timer(_LOOK_PERIOD_S, self._look, clock=self._steady)
 
-    def _on_pose(self, message: PoseStamped) -> None:
+    def _subscribe(self, feed: Feed) -> Subscription:
+        t = feed.topic
+        return self.create_subscription(
+            t.type,
+            t.name,
+            lambda message: self._receive(message, feed.convert),
+            t.qos,
+            event_callbacks=SubscriptionEventCallbacks(incompatible_qos=self._on_incompatible_qos),
+            qos_overriding_options=QoSOverridingOptions.with_default_policies(),
+        )
+
+    def _receive(self, message: Any, convert: Convert) -> None:
         now = self.get_clock().now().nanoseconds
+        measured = convert(message)
+        if measured is None:
+            return
         self._arrivals.append(self._steady_ns())
-        self._warn_of_frame(message.header.frame_id)
-        stamp = stamp_ns(message)
-        before = self._filter.estimate
-        if before is not None and before.stamp_ns > now + _FUTURE_TOLERANCE_NS:
-            self.get_logger().warning("the clock was set back: the filter starts anew")
-            self._filter.reset()
-        ahead = stamp - now
-        if ahead > _FUTURE_TOLERANCE_NS:
-            # Once accepted, it would make every later pose look out of order.
-            self._reject(f"pose is stamped {ahead * 1e-9:.3f} s ahead of this computer's clock")
+        if isinstance(measured, Measurement):
+            result = self._intake.take(measured, now)
+            if self._intake.news:
+                self._news, self._news_ns = self._intake.news, self._steady_ns()
+                self.get_logger().warning(self._news)
         else:
-            result = self._filter.update(
-                stamp, array(message.pose.position), array(message.pose.orientation)
-            )
-            if not isinstance(result, Rejection):
-                self._accepted += 1
-                self._fault = ""
-                self._odometry.publish(
-                    odometry_message(result, self._config.frame_id, self._config.child_frame_id)
-                )
-            elif result.reason is Reason.OUT_OF_ORDER:
-                self._out_of_order += 1
-            else:
-                self._reject(result.text)
-        if self._judge(now)[0] != self._published_status:
-            self._publish_status()
+            result = self._intake.refuse(measured)
+        if isinstance(result, HeadEstimate):
+            self._fault = None
+            self._publish_odometry(result)
+        elif result.reason.is_fault:
+            self._fault, self._fault_ns = result, self._steady_ns()
+        verdict = self._judge(now)
+        if self._published is None or verdict.status != self._published.status:
+            self._publish_status(verdict, now)
+
+    def _publish_odometry(self, estimate: HeadEstimate) -> None:
+        """Send what is believed of the head: every accepted pose ends here, and nothing else."""
+        self._odometry.publish(
+            odometry_message(estimate, self._config.frame_id, self._config.child_frame_id)
+        )
 
     def _steady_ns(self) -> int:
         return self._steady.now().nanoseconds
 
-    def _reject(self, text: str) -> None:
-        self._rejected += 1
-        self._fault = text
-        self._fault_ns = self._steady_ns()
-
-    def _judge(self, now: int) -> tuple[int, str]:
-        """Status and text at time ``now`` [ns]."""
-        estimate = self._filter.estimate
-        since_fault_ns = self._steady_ns() - self._fault_ns
-        if self._fault and (since_fault_ns <= self._timeout_ns or estimate is None):
-            return PoseStatus.STATUS_INVALID, self._fault
+    def _judge(self, now: int) -> Verdict:
+        """Return how far the head pose can be trusted at time ``now`` [ns]."""
+        estimate, steady_ns = self._intake.estimate, self._steady_ns()
+        remarks = [self._intake.clock.problem, self._senders.problem]
+        if self._news and steady_ns - self._news_ns < _NEWS_NS:
+            remarks.append(self._news)
+        remark = "; ".join(filter(None, remarks))
+        fault = self._fault
+        if fault and (steady_ns - self._fault_ns <= self._timeout_ns or estimate is None):
+            reason = NUMBER_OF_REASON[fault.reason]
+            return Verdict(PoseStatus.STATUS_INVALID, reason, fault.text, remark)
+        none = PoseStatus.REASON_NONE
         if estimate is None:
-            return PoseStatus.STATUS_WAITING, "no pose received yet on mocap/pose"
+            text = f"no pose received yet on {self._subscription.topic_name.lstrip('/')}"
+            if not (self._senders.fitting or self._senders.problem):
+                text += ": nobody publishes it"
+            return Verdict(PoseStatus.STATUS_WAITING, none, text, remark)
         age = (now - estimate.stamp_ns) * 1e-9
         if age <= self._config.timeout_s:
-            return PoseStatus.STATUS_VALID, "valid"
+            return Verdict(PoseStatus.STATUS_VALID, none, "valid", remark)
         text = f"the last good pose is {age:.2f} s old (limit {self._config.timeout_s:g} s)"
         if self._rate() > 0:
             text += "; poses do arrive: are the clocks of both computers synchronised?"
-        return PoseStatus.STATUS_STALE, text
+        return Verdict(PoseStatus.STATUS_STALE, none, text, remark)
 
-    def _publish_status(self) -> None:
+    def _report(self) -> None:
+        """Publish the status, and diagnostics when they are due or something has changed."""
         now = self.get_clock().now().nanoseconds
-        status, text = self._judge(now)
-        if status != self._published_status:
-            # Two calls: rclpy holds one line of code to one severity.
-            if status in (PoseStatus.STATUS_STALE, PoseStatus.STATUS_INVALID):
-                self.get_logger().warning(f"head pose: {text}")
+        self._publish_status(self._judge(now), now)
+
+    def _publish_status(self, verdict: Verdict, now: int) -> None:
+        before, self._published = self._published, verdict
+        # Two calls: rclpy holds one line of code to one severity.
+        if before is None or verdict.status != before.status:
+            if verdict.status in (PoseStatus.STATUS_STALE, PoseStatus.STATUS_INVALID):
+                self.get_logger().warning(f"head pose: {verdict.words}")
             else:
-                self.get_logger().info(f"head pose: {text}")
-            self._published_status = status
-        estimate = self._filter.estimate
-        self._status.publish(
-            PoseStatus(
-                header=header(now, self._config.frame_id),
-                status=status,
-                text=text,
-                age=float("inf") if estimate is None else (now - estimate.stamp_ns) * 1e-9,
-                accepted=self._accepted,
-                rejected=self._rejected,
-                out_of_order=self._out_of_order,
-                rate=self._rate(),
-            )
+                self.get_logger().info(f"head pose: {verdict.words}")
+        status = status_message(
+            verdict,
+            self._intake,
+            now,
+            self._config.frame_id,
+            self._rate(),
+            self._senders.fitting,
         )
+        self._status.publish(status)
+        self._diagnose(status, verdict)
+
+    def _diagnose(self, status: PoseStatus, verdict: Verdict) -> None:
+        steady_ns = self._steady_ns()
+        last = self._diagnosed
+        changed = (
+            last is None
+            or (verdict.status, verdict.reason) != (last.status, last.reason)
+            or bool(verdict.remarks) != bool(last.remarks)
+        )
+        if not changed and steady_ns - self._diagnosed_ns < self._diagnostics_ns:
+            return
+        self._diagnosed, self._diagnosed_ns = verdict, steady_ns
+        self._diagnostics.publish(
+            diagnostics(status, verdict, self._intake, self._subscription.topic_name)
+        )
+
+    def _look(self) -> None:
+        """See who publishes, and what is wrong with the clocks; tell it once."""
+        before = self._senders.problem
+        self._senders.look(self._subscription)
+        if self._senders.problem and self._senders.problem != before:
+            self.get_logger().warning(self._senders.problem)
+
+    def _on_incompatible_qos(self, event: QoSRequestedIncompatibleQoSInfo) -> None:
+        policy = qos_policy_name_from_kind(event.last_policy_kind)
+        self.get_logger().warning(
+            f"a publisher of {self._subscription.topic_name} offers another quality of service "
+            f"than is asked for ({policy}): nothing of it can be heard"
+        )
+        self._look()
 
     def _rate(self) -> float:
         """Arrival frequency over the last second [Hz]."""
@@ -135,14 +205,6 @@ class PoseInput(Node):
         if len(self._arrivals) < 2:
             return 0.0
         return (len(self._arrivals) - 1) / ((self._arrivals[-1] - self._arrivals[0]) * 1e-9 or 1.0)
-
-    def _warn_of_frame(self, frame_id: str) -> None:
-        if frame_id != self._config.frame_id and frame_id not in self._frames_warned:
-            self._frames_warned.add(frame_id)
-            self.get_logger().warning(
-                f"poses are given in frame '{frame_id}'; they are taken as if in "
-                f"'{self._config.frame_id}', which is right only if both are the same frame"
-            )
 
     def close(self) -> None:
         """Nothing moves because of this node alone."""

@@ -6,10 +6,17 @@ All names are relative, so that one namespace holds one robot; `~/x` belongs to 
 from __future__ import annotations
 
 import dataclasses
+import importlib
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import PoseStamped, Twist, TwistStamped
+from geometry_msgs.msg import (
+    PoseStamped,
+    PoseWithCovarianceStamped,
+    TransformStamped,
+    Twist,
+    TwistStamped,
+)
 from nav_msgs.msg import Odometry, Path
 from rcl_interfaces.msg import Log
 from rclpy.qos import (
@@ -67,6 +74,35 @@ class Topic:
 
 
 @dataclasses.dataclass(frozen=True)
+class ForeignTopic:
+    """A topic whose type comes with a package that not everybody has installed.
+
+    Attributes:
+        name, qos: as for ``Topic``.
+        package, type_name: where the type is.
+    """
+
+    name: str
+    package: str
+    type_name: str
+    qos: QoSProfile
+
+    def load(self) -> Topic:
+        """Return the topic with its type.
+
+        Raises:
+            ImportError: the package is not there.
+        """
+        module = importlib.import_module(f"{self.package}.msg")
+        return Topic(self.name, getattr(module, self.type_name), self.qos)
+
+    @property
+    def apt_package(self) -> str:
+        """Name of the package to be installed, on a robot's computer."""
+        return f"ros-jazzy-{self.package.replace('_', '-')}"
+
+
+@dataclasses.dataclass(frozen=True)
 class Action:
     """An action's name and type."""
 
@@ -103,7 +139,34 @@ EMERGENCY_STOP_ACTIVE = Topic("~/emergency_stop_active", Bool, _LATCHED)
 # Absolute by ROS convention: one aggregator serves the whole graph.
 DIAGNOSTICS = Topic("/diagnostics", DiagnosticArray, _STATE)
 
+# Best effort takes poses of reliable publishers, too; of each only the newest few count.
 MOCAP_POSE = Topic("mocap/pose", PoseStamped, qos_profile_sensor_data)
+MOCAP_POSE_WITH_COVARIANCE = Topic(
+    "mocap/pose_with_covariance", PoseWithCovarianceStamped, qos_profile_sensor_data
+)
+MOCAP_TRANSFORM = Topic("mocap/transform", TransformStamped, qos_profile_sensor_data)
+MOCAP_ODOMETRY = Topic("mocap/odometry", Odometry, qos_profile_sensor_data)
+MOCAP_RIGID_BODIES = ForeignTopic(
+    "mocap/rigid_bodies", "mocap4r2_msgs", "RigidBodies", qos_profile_sensor_data
+)
+MOCAP_NAMED_POSES = ForeignTopic(
+    "mocap/poses",
+    "motion_capture_tracking_interfaces",
+    "NamedPoseArray",
+    qos_profile_sensor_data,
+)
+# Absolute by ROS convention, and with many senders.
+TF = ForeignTopic(
+    "/tf",
+    "tf2_msgs",
+    "TFMessage",
+    QoSProfile(
+        history=HistoryPolicy.KEEP_LAST, depth=100, reliability=ReliabilityPolicy.BEST_EFFORT
+    ),
+)
+TF_STATIC = ForeignTopic(
+    "/tf_static", "tf2_msgs", "TFMessage", _reliable(100, DurabilityPolicy.TRANSIENT_LOCAL)
+)
 HEAD_ODOMETRY = Topic("head/odometry", Odometry, _STATE)
 HEAD_STATUS = Topic("head/status", PoseStatus, _STATE)
 

@@ -100,6 +100,45 @@ def test_noise_falls_as_documented():
     assert angular_velocity == pytest.approx(rate_gain * sigma_rotation, rel=0.05)
 
 
+def test_the_covariance_is_that_of_many_runs():
+    rng = np.random.default_rng(3)
+    # Position and rotation of a measurement may depend on each other; steps are uneven.
+    root = rng.normal(0.0, 1e-3, (6, 6))
+    noise = root @ root.T
+    stamps = np.cumsum(rng.integers(4_000_000, 30_000_000, 50))
+    omega = np.array([0.4, -0.7, 0.9])
+    truth = [Rotation.from_rotvec(omega * (s - stamps[0]) * 1e-9) for s in stamps]
+    poses, twists = [], []
+    for _ in range(150):
+        filter_ = HeadFilter(CUTOFF_HZ, TIMEOUT_S)
+        for stamp, rotation in zip(stamps, truth, strict=True):
+            error = rng.multivariate_normal(np.zeros(6), noise)
+            turned = Rotation.from_rotvec(error[3:]) * rotation
+            last = filter_.update(int(stamp), error[:3], turned.as_quat(), noise)
+        poses.append([*last.position, *(last.rotation * truth[-1].inv()).as_rotvec()])
+        twists.append([*last.velocity, *(last.angular_velocity - omega)])
+    # The unknown start of the rate has faded; of 150 runs a deviation is known to 6 %.
+    for errors, predicted in ((poses, last.pose_covariance), (twists, last.twist_covariance)):
+        found = np.cov(np.transpose(errors))
+        np.testing.assert_allclose(found, predicted, atol=0.35 * predicted.diagonal().max())
+
+
+def test_the_covariance_comes_down_to_the_documented_figures():
+    filter_ = HeadFilter(CUTOFF_HZ, TIMEOUT_S, max_speed_m_s=1.0, max_turning_rad_s=6.0)
+    noise = np.diag(np.square(np.repeat([0.0005, 0.002], 3)))
+    for k in range(500):
+        estimate = filter_.update(k * STEP_NS, (0, 0, 0), LEVEL, noise)
+        if k == 0:
+            np.testing.assert_array_equal(estimate.pose_covariance, noise)
+            speeds = np.sqrt(np.diag(estimate.twist_covariance))
+            np.testing.assert_allclose(speeds, [0.5] * 3 + [3.0] * 3)
+    g, h = gains(CUTOFF_HZ, STEP_NS * 1e-9)
+    d = g * (4 - 2 * g - h)
+    of_pose, of_rate = (2 * g * g + 2 * h - 3 * g * h) / d, 2 * h * h / d / (STEP_NS * 1e-9) ** 2
+    np.testing.assert_allclose(estimate.pose_covariance, of_pose * noise, atol=1e-12)
+    np.testing.assert_allclose(estimate.twist_covariance, of_rate * noise, rtol=1e-4, atol=1e-15)
+
+
 def moving_filter():
     """A filter that has seen 2 s of motion along x at 0.1 m/s, and its last stamp."""
     filter_ = HeadFilter(CUTOFF_HZ, TIMEOUT_S)

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import PoseStamped
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from snake_interfaces.msg import PoseStatus
@@ -21,14 +22,20 @@ RPY = np.array([0.1, -0.8, 2.5])
 class Mocap:
     """A motion capture system whose poses a test makes."""
 
-    def __init__(self, graph, reliability=ReliabilityPolicy.BEST_EFFORT, **params):
+    def __init__(self, graph, reliability=ReliabilityPolicy.BEST_EFFORT, wait=True, **params):
         self.graph = graph
         self.odometry = graph.subscribe(topics.HEAD_ODOMETRY)
         self.status = graph.subscribe(topics.HEAD_STATUS)
         qos = QoSProfile(depth=5, reliability=reliability)
         self.publisher = graph.node.create_publisher(PoseStamped, topics.MOCAP_POSE.name, qos)
         graph.start("pose_input", params_files=[CONFIG / "paper_robot.yaml"], params=params)
-        graph.wait_for(self.publisher.get_subscription_count, 30.0, "pose_input")
+        if wait:
+            graph.wait_for(self.publisher.get_subscription_count, 30.0, "pose_input")
+
+    @property
+    def text(self):
+        """Text of the newest status."""
+        return self.status.last.text if self.status.last else ""
 
     def send(self, stamp, position=(0.0, 0.0, 0.3), rotation=None, frame="world"):
         message = PoseStamped(header=header(stamp, frame))
@@ -49,13 +56,15 @@ class Mocap:
     def send_until_valid(self):
         """Send until a pose has come through (best effort may lose the first ones)."""
         before = len(self.odometry.messages)
+        accepted = self.status.last.accepted if self.status.last else 0
 
         def arrived():
             self.send(self.graph.now_ns())
-            return len(self.odometry.messages) > before
+            last = self.status.last
+            good = last and last.status == PoseStatus.STATUS_VALID and last.accepted > accepted
+            return last if good and len(self.odometry.messages) > before else None
 
-        self.graph.wait_for(arrived, 20.0, "odometry")
-        return self.wait_status(PoseStatus.STATUS_VALID)
+        return self.graph.wait_for(arrived, 20.0, "odometry")
 
 
 @pytest.fixture(scope="module")
@@ -153,7 +162,7 @@ def test_old_poses_are_stale_although_they_arrive(mocap):
     mocap.graph.wait_for(noticed, 20.0, "poses found out of order")
     stamps = [stamp_ns(message) for message in mocap.odometry.messages]
     assert stamps == sorted(stamps)
-    assert "synchronised" in mocap.wait_status(PoseStatus.STATUS_STALE).text
+    assert "synchronise" in mocap.wait_status(PoseStatus.STATUS_STALE).text
 
 
 def test_status_comes_regularly_and_counts(mocap):
@@ -164,19 +173,52 @@ def test_status_comes_regularly_and_counts(mocap):
     assert counts[0] > 0
 
 
-def test_reliable_poses_of_another_frame_are_taken_with_a_warning():
+def test_reliable_poses_of_a_frame_that_is_named_are_taken_and_no_others():
     with Graph() as graph:
-        mocap = Mocap(graph, ReliabilityPolicy.RELIABLE)
+        mocap = Mocap(graph, ReliabilityPolicy.RELIABLE, pose_frames=["mocap_volume"])
 
-        def arrived():
-            mocap.send(graph.now_ns(), frame="mocap_volume")
-            return mocap.odometry.last
+        def sent(frame, condition):
+            def met():
+                mocap.send(graph.now_ns(), frame=frame)
+                return condition()
 
-        graph.wait_for(arrived, 20.0, "odometry")
+            graph.wait_for(met, 20.0, f"what becomes of frame {frame}")
+
+        sent("camera", lambda: "frame 'camera', not in 'world'" in mocap.text)
+        assert mocap.odometry.last is None
+        assert mocap.status.last.reason == PoseStatus.REASON_WRONG_FRAME
+        counts = mocap.status.last.rejected_by_reason
+        assert counts[PoseStatus.REASON_WRONG_FRAME - 1] == mocap.status.last.rejected > 0
+        sent("mocap_volume", lambda: mocap.odometry.last)
         assert mocap.odometry.last.header.frame_id == "world"
         np.testing.assert_allclose(array(mocap.odometry.last.pose.pose.position), [0, 0, 0.3])
-        report = graph.report()
-        assert "mocap_volume" in report
+        # Raw at first; what the filter leaves of the noise is known.
+        sent("mocap_volume", lambda: 0 < mocap.odometry.last.pose.covariance[0] < 0.0005**2)
+        assert 0 < mocap.odometry.last.twist.covariance[0] < 0.01
+
+
+def test_what_keeps_poses_from_being_heard_is_said():
+    with Graph() as graph:
+        diagnostics = graph.subscribe(topics.DIAGNOSTICS)
+        wrong = f"{topics.HEAD_REFERENCE.name}:={topics.MOCAP_POSE.name}"
+        graph.start("trajectory_generator", arguments=["-r", wrong])
+        params = {"qos_overrides./mocap/pose.subscription.reliability": "reliable"}
+        mocap = Mocap(graph, wait=False, **params)
+        for text in ("as snake_interfaces/msg/HeadReference", "quality of service"):
+            mocap.graph.wait_for(lambda text=text: text in mocap.text, 20.0, text)
+            assert mocap.status.last.publishers == 0
+            assert text in graph.report()
+            graph.wait_for(
+                lambda text=text: any(
+                    status.name == "pose_input: head pose"
+                    and status.level == DiagnosticStatus.WARN
+                    and text in status.message
+                    for array in diagnostics.messages
+                    for status in array.status
+                ),
+                20.0,
+                f"diagnostics with {text}",
+            )
 
 
 def test_poses_go_on_when_the_clock_is_set_back_and_stands():
