@@ -12,11 +12,12 @@ SEED ?= 1
 SCENARIO ?=
 GRAPH ?=
 RECORD ?=
+FAULT ?=
 PACKETS ?= 1000000
 PYTHON ?=
 export PYTHON
 
-.PHONY: help demo test lint bench faults fuzz heads clean setup build FORCE
+.PHONY: help demo test lint bench faults pose-faults fuzz heads clean setup build FORCE
 
 help:
 	@printf '%s\n' \
@@ -27,6 +28,7 @@ help:
 	  'make lint    style, types and the import rules' \
 	  'make bench   time control step, dynamics and lockstep; results in out/bench.json' \
 	  'make faults  try driver and mock with every fault; table in out/faults.md  SCENARIO=name for one' \
+	  'make pose-faults  the same for the motion capture, on the whole graph; table in out/pose_faults.md' \
 	  'make heads   200 head trajectories and 100 hostile references in lockstep; table in out/heads.md' \
 	  '             GRAPH=1: some of them through all nodes, by the wall clock' \
 	  'make fuzz    a million random packets against the mock and the driver  PACKETS=n' \
@@ -86,6 +88,9 @@ bench: build/ready .venv/bench
 
 faults: build/ready
 	@. scripts/env.sh && PYTHONPATH=.:test:$$PYTHONPATH exec python -m faults.campaign $(SCENARIO)
+
+pose-faults: build/ready
+	@. scripts/env.sh && PYTHONPATH=.:test:$$PYTHONPATH exec python -m poses.campaign $(FAULT)
 
 fuzz: build/ready
 	@. scripts/env.sh && PYTHONPATH=.:test:$$PYTHONPATH exec python -m fuzz.run --packets $(PACKETS)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-_REAL_TIME = ("nodes", "cli", "faults", "launch_files")
+_REAL_TIME = ("nodes", "cli", "faults", "poses", "launch_files")
 _ANY_TIME = (
     "cli/test_demo_arguments.py",
     "cli/test_evaluate.py",

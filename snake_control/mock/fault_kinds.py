@@ -16,6 +16,8 @@ class Concerns(enum.Enum):
     """Servos: it takes ids."""
     LINE = "line"
     """The whole line: it takes no ids."""
+    POSES = "poses"
+    """Poses of the motion capture (``pose_faults``): it takes a probability."""
 
 
 @dataclasses.dataclass(frozen=True)

@@ -8,6 +8,8 @@ from collections import deque
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from snake_control.mock.pose_faults import PoseFaults
+
 Array = NDArray[np.float64]
 
 
@@ -35,16 +37,24 @@ class CapturedPose:
     Attributes:
         time: when the pose was as measured [s].
         position: shape (3,) [m].
-        quaternion: [x, y, z, w] of length 1.
+        quaternion: [x, y, z, w], of length 1 without faults.
+        elsewhere: whether it says to be of another frame: a fault.
+        due: when it is reported [s].
     """
 
     time: float
     position: Array
     quaternion: Array
+    elsewhere: bool = False
+    due: float = 0.0
 
 
 class MotionCapture:
-    """Measures poses and hands each out after a delay."""
+    """Measures poses and hands each out after a delay, in order.
+
+    Attributes:
+        faults: what may be made to go wrong.
+    """
 
     def __init__(self, noise: Noise, delay_s: float, rng: np.random.Generator) -> None:
         """Set up the cameras.
@@ -57,6 +67,8 @@ class MotionCapture:
         self._noise = noise
         self._delay_s = delay_s
         self._rng = rng
+        # Numbers of their own: faults leave the noise of the other poses as it is.
+        self.faults = PoseFaults(rng.spawn(1)[0])
         self._waiting: deque[CapturedPose] = deque()
 
     def capture(self, time: float, position: ArrayLike, quaternion: ArrayLike) -> None:
@@ -64,18 +76,22 @@ class MotionCapture:
         noise = self._noise
         turn = self._rng.normal(0.0, 1.0, 3) * noise.rotation_rad
         offset = self._rng.normal(0.0, 1.0, 3) * noise.position_m
+        sent = self.faults.spoil(
+            time,
+            np.asarray(position, dtype=float) + offset,
+            _product(_from_rotation_vector(turn), np.asarray(quaternion, dtype=float)),
+        )
+        if sent is None:
+            return
+        due = time + self._delay_s + sent.later_s
         self._waiting.append(
-            CapturedPose(
-                time,
-                np.asarray(position, dtype=float) + offset,
-                _product(_from_rotation_vector(turn), np.asarray(quaternion, dtype=float)),
-            )
+            CapturedPose(time, sent.position, sent.quaternion, sent.elsewhere, due)
         )
 
     @property
     def next_report_at(self) -> float:
         """Time of the next report [s]; infinite if none is waiting."""
-        return self._waiting[0].time + self._delay_s if self._waiting else float("inf")
+        return self._waiting[0].due if self._waiting else float("inf")
 
     def report(self, now: float) -> list[CapturedPose]:
         """Return the poses whose delay has passed, oldest first."""

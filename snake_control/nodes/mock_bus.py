@@ -21,11 +21,12 @@ from std_srvs.srv import Trigger
 from snake_control.config import Config, MockBusConfig
 from snake_control.errors import BusError, ConfigError, SnakeError
 from snake_control.mock.bus import Bus
-from snake_control.mock.faults import Fault
+from snake_control.mock.faults import Fault, FaultError
 from snake_control.mock.mechanics import MotorParameters
 from snake_control.mock.motion_capture import CapturedPose, MotionCapture, Noise
 from snake_control.mock.parameters import ServoParameters
 from snake_control.mock.port import PtyPort
+from snake_control.mock.pose_faults import POSE_KINDS, PoseFault
 from snake_control.mock.scenario import load_scenario
 from snake_control.mock.server import Server
 from snake_control.mock.servo import Servo
@@ -43,6 +44,7 @@ _GROUND_TRUTH_HZ = 50.0
 # Snapshots come at multiples of the body's step, which no sum of floating point hits exactly.
 _ROUNDING_S = 1e-6
 _CHECK_PERIOD_S = 0.2
+_ELSEWHERE = "elsewhere"
 
 
 class MockBus(Node):
@@ -131,24 +133,41 @@ class MockBus(Node):
     def _inject_fault(
         self, request: InjectFault.Request, response: InjectFault.Response
     ) -> InjectFault.Response:
+        fault: Fault | PoseFault
         try:
-            fault = Fault(
-                kind=request.fault,
-                ids=tuple(request.ids),
-                duration_s=request.duration,
-                value=request.value or None,
-                probability=request.probability,
-            )
-            self._server.inject(fault)
+            if request.fault in POSE_KINDS:
+                fault = self._begin_pose_fault(request)
+            else:
+                fault = Fault(
+                    kind=request.fault,
+                    ids=tuple(request.ids),
+                    duration_s=request.duration,
+                    value=request.value or None,
+                    probability=request.probability,
+                )
+                self._server.inject(fault)
         except SnakeError as error:
             response.success, response.message = False, str(error)
         else:
             response.success, response.message = True, str(fault)
         return response
 
+    def _begin_pose_fault(self, request: InjectFault.Request) -> PoseFault:
+        if request.ids:
+            raise FaultError(
+                "ids", list(request.ids), f"{request.fault} concerns the motion capture: give none"
+            )
+        fault = PoseFault(
+            request.fault, request.duration, request.value or None, request.probability
+        )
+        self._motion_capture.faults.inject(fault, time.monotonic())
+        self.get_logger().warning(f"fault: {fault}")
+        return fault
+
     def _clear_faults(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         try:
-            response.message = f"{self._server.clear_faults()} faults ended"
+            count = self._server.clear_faults() + self._motion_capture.faults.clear()
+            response.message = f"{count} faults ended"
         except SnakeError as error:
             response.success, response.message = False, str(error)
         else:
@@ -202,7 +221,8 @@ class MockBus(Node):
         return self.get_clock().now().nanoseconds - age_ns
 
     def _pose_message(self, pose: CapturedPose) -> PoseStamped:
-        message = PoseStamped(header=header(self._stamp_ns(pose.time), self._own.frame_id))
+        frame_id = _ELSEWHERE if pose.elsewhere else self._own.frame_id
+        message = PoseStamped(header=header(self._stamp_ns(pose.time), frame_id))
         message.pose.position = point(pose.position)
         message.pose.orientation = quaternion(pose.quaternion)
         return message

@@ -71,8 +71,8 @@ def _loaded(topic: topics.ForeignTopic, source: str = "tf") -> topics.Topic:
         raise ConfigError(
             "source",
             source,
-            f"{topic.package} cannot be imported: sudo apt install {topic.apt_package} (or build "
-            f"it in this workspace), and source its setup.bash; it said: {error}",
+            f"{topic.package} cannot be imported ({error}): {topic.origin}, and source the "
+            "setup.bash of where it is",
         ) from error
 
 

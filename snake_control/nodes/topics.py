@@ -80,12 +80,14 @@ class ForeignTopic:
     Attributes:
         name, qos: as for ``Topic``.
         package, type_name: where the type is.
+        origin: how to get the package.
     """
 
     name: str
     package: str
     type_name: str
     qos: QoSProfile
+    origin: str
 
     def load(self) -> Topic:
         """Return the topic with its type.
@@ -95,11 +97,6 @@ class ForeignTopic:
         """
         module = importlib.import_module(f"{self.package}.msg")
         return Topic(self.name, getattr(module, self.type_name), self.qos)
-
-    @property
-    def apt_package(self) -> str:
-        """Name of the package to be installed, on a robot's computer."""
-        return f"ros-jazzy-{self.package.replace('_', '-')}"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -147,13 +144,18 @@ MOCAP_POSE_WITH_COVARIANCE = Topic(
 MOCAP_TRANSFORM = Topic("mocap/transform", TransformStamped, qos_profile_sensor_data)
 MOCAP_ODOMETRY = Topic("mocap/odometry", Odometry, qos_profile_sensor_data)
 MOCAP_RIGID_BODIES = ForeignTopic(
-    "mocap/rigid_bodies", "mocap4r2_msgs", "RigidBodies", qos_profile_sensor_data
+    "mocap/rigid_bodies",
+    "mocap4r2_msgs",
+    "RigidBodies",
+    qos_profile_sensor_data,
+    "build https://github.com/MOCAP4ROS2-Project/mocap4r2_msgs (Jazzy has no apt package of it)",
 )
 MOCAP_NAMED_POSES = ForeignTopic(
     "mocap/poses",
     "motion_capture_tracking_interfaces",
     "NamedPoseArray",
     qos_profile_sensor_data,
+    "sudo apt install ros-jazzy-motion-capture-tracking-interfaces",
 )
 # Absolute by ROS convention, and with many senders.
 TF = ForeignTopic(
@@ -163,9 +165,10 @@ TF = ForeignTopic(
     QoSProfile(
         history=HistoryPolicy.KEEP_LAST, depth=100, reliability=ReliabilityPolicy.BEST_EFFORT
     ),
+    "sudo apt install ros-jazzy-tf2-msgs",
 )
-TF_STATIC = ForeignTopic(
-    "/tf_static", "tf2_msgs", "TFMessage", _reliable(100, DurabilityPolicy.TRANSIENT_LOCAL)
+TF_STATIC = dataclasses.replace(
+    TF, name="/tf_static", qos=_reliable(100, DurabilityPolicy.TRANSIENT_LOCAL)
 )
 HEAD_ODOMETRY = Topic("head/odometry", Odometry, _STATE)
 HEAD_STATUS = Topic("head/status", PoseStatus, _STATE)

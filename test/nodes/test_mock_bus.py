@@ -184,6 +184,7 @@ def test_faults_come_and_go_by_service(graph, link):
         ({"fault": "gremlins"}, "known are no_reply"),
         ({"fault": "no_reply", "ids": [99]}, "on the bus are"),
         ({"fault": "late_reply", "value": 99.0}, "delay [s]"),
+        ({"fault": "pose_jump", "ids": [2]}, "concerns the motion capture"),
     ):
         refused = inject(**fields)
         assert not refused.success

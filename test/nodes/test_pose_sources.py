@@ -217,5 +217,6 @@ def test_a_package_that_is_missing_is_named(source):
         assert process.wait(30.0) == 2
         output = process.output()
         assert f"source = '{source}'" in output
-        assert f"sudo apt install ros-jazzy-{package.replace('_', '-')}" in output
+        assert f"{package} cannot be imported" in output
+        assert FOREIGN[source].origin in output
         assert "Traceback" not in output

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-OURS = {"snake_control", "support", "benchmarks", "faults", "fuzz", "heads", "pose_watch"}
+OURS = {"snake_control", "support", "benchmarks", "faults", "fuzz", "heads", "pose_watch", "poses"}
 # module: key of rosdep, where the two differ
 KEYS = {
     "hypothesis": "python3-hypothesis",

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from geometry_msgs.msg import TwistStamped
@@ -24,9 +25,10 @@ class WholeGraph:
         truth, commands, references, states, bus: recorders.
     """
 
-    def __init__(self, directory: Path) -> None:
-        """Prepare; ``directory`` is for the port's link."""
+    def __init__(self, directory: Path, **params: Mapping[str, Any]) -> None:
+        """Prepare; ``directory`` is for the port's link, ``params`` are by kind of node."""
         self._port = directory / "servo_bus"
+        self._params = params
         self._velocity: tuple[float, float, float] | None = None
 
     def __enter__(self) -> WholeGraph:
@@ -46,9 +48,11 @@ class WholeGraph:
                 "scp_controller",
                 "trajectory_generator",
             ):
-                port = {"port": str(self._port)} if kind in ("mock_bus", "bus_driver") else None
+                port = {"port": str(self._port)} if kind in ("mock_bus", "bus_driver") else {}
                 self.processes[kind] = graph.start(
-                    kind, params_files=[CONFIG / "paper_robot.yaml"], params=port
+                    kind,
+                    params_files=[CONFIG / "paper_robot.yaml"],
+                    params={**port, **self._params.get(kind, {})},
                 )
                 if kind == "mock_bus":
                     graph.wait_for(self._port.exists, 30.0, "the port of the mock")
