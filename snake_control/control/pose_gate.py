@@ -89,20 +89,18 @@ class JumpGate:
         """
         if last is None:
             return None
-        distance = float(np.linalg.norm(position - last.position))
-        angle = float((rotation * last.rotation.inv()).magnitude())
-        if self._can_be(distance, angle, stamp_ns - last.stamp_ns):
+        distance, angle = _apart(position, rotation, last.position, last.rotation)
+        good = self._can_be(distance, angle, stamp_ns - last.stamp_ns)
+        now = _Candidate(stamp_ns, position, rotation, stamp_ns, 1)
+        if before := self._candidate:
+            apart = _apart(position, rotation, before.position, before.rotation)
+            if self._can_be(*apart, stamp_ns - before.stamp_ns):
+                now = dataclasses.replace(now, begun_ns=before.begun_ns, poses=before.poses + 1)
+                # An outlier that stays does not become believable by waiting.
+                good = good and self._far(distance, angle) <= self._far(*apart)
+        if good:
             self._candidate = None
             return None
-        before = self._candidate
-        if before is None or not self._can_be(
-            float(np.linalg.norm(position - before.position)),
-            float((rotation * before.rotation.inv()).magnitude()),
-            stamp_ns - before.stamp_ns,
-        ):
-            now = _Candidate(stamp_ns, position, rotation, stamp_ns, 1)
-        else:
-            now = _Candidate(stamp_ns, position, rotation, before.begun_ns, before.poses + 1)
         self._candidate = now
         lasted = (stamp_ns - now.begun_ns) * 1e-9
         if now.poses >= self._limits.new_place_after and lasted >= self._limits.horizon_s:
@@ -114,6 +112,14 @@ class JumpGate:
             f"the head can have moved ({now.poses} of {self._limits.new_place_after} that agree)",
         )
 
+    def _far(self, distance: float, angle: float) -> float:
+        """How far two poses are apart, as a share of what a head may move within the horizon."""
+        limits = self._limits
+        return max(
+            distance / (limits.tolerance_m + limits.speed_m_s * limits.horizon_s),
+            angle / (limits.tolerance_rad + limits.turning_rad_s * limits.horizon_s),
+        )
+
     def _can_be(self, distance: float, angle: float, step_ns: int) -> bool:
         limits = self._limits
         dt = min(max(step_ns * 1e-9, 0.0), limits.horizon_s)
@@ -121,3 +127,13 @@ class JumpGate:
             distance <= limits.tolerance_m + limits.speed_m_s * dt
             and angle <= limits.tolerance_rad + limits.turning_rad_s * dt
         )
+
+
+def _apart(
+    position: Array, rotation: Rotation, other_position: Array, other_rotation: Rotation
+) -> tuple[float, float]:
+    """Distance [m] and angle [rad] between two poses."""
+    return (
+        float(np.linalg.norm(position - other_position)),
+        float((rotation * other_rotation.inv()).magnitude()),
+    )

@@ -55,7 +55,7 @@ class PoseInput(Node):
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._intake = PoseIntake(self._config, FUTURE_TOLERANCE_S)
         self._fault: Rejection | None = None
-        self._fault_ns = 0
+        self._fault_ns = self._accepted_ns = 0
         self._news, self._news_ns = "", 0
         self._arrivals: collections.deque[int] = collections.deque()
         self._published: Verdict | None = None
@@ -101,7 +101,7 @@ class PoseInput(Node):
         else:
             result = self._intake.refuse(measured)
         if isinstance(result, HeadEstimate):
-            self._fault = None
+            self._fault, self._accepted_ns = None, self._steady_ns()
             self._publish_odometry(result)
         elif result.reason.is_fault:
             self._fault, self._fault_ns = result, self._steady_ns()
@@ -139,8 +139,8 @@ class PoseInput(Node):
         if age <= self._config.timeout_s:
             return Verdict(PoseStatus.STATUS_VALID, none, "valid", remark)
         text = f"the last good pose is {age:.2f} s old (limit {self._config.timeout_s:g} s)"
-        if self._rate() > 0:
-            text += "; poses do arrive: are the clocks of both computers synchronised?"
+        if steady_ns - self._accepted_ns <= self._timeout_ns:
+            text += " though it has just arrived: are the clocks of both computers synchronised?"
         return Verdict(PoseStatus.STATUS_STALE, none, text, remark)
 
     def _report(self) -> None:

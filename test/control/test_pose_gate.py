@@ -65,6 +65,17 @@ def test_outliers_that_agree_are_a_new_place():
     assert found.distance_m == pytest.approx(0.511)
 
 
+def test_a_small_step_does_not_become_believable_by_waiting():
+    # After 0.1 s a head may be 0.13 m away, but this one was there after 0.01 s.
+    gate = JumpGate(LIMITS)
+    results = [judge(gate, k, (0.1, 0, 0)) for k in range(1, 12)]
+    assert all(isinstance(result, Rejection) for result in results[:10])
+    assert isinstance(results[10], NewPlace)
+    back = JumpGate(LIMITS)
+    judge(back, 1, (0.1, 0, 0))
+    assert judge(back, 2, (0.01, 0, 0)) is None
+
+
 def test_they_must_last_for_the_horizon_however_many_there_are():
     gate = JumpGate(LIMITS)
     quick = [gate.judge(k * 1_000_000, np.array([0.5, 0, 0]), LEVEL, HERE) for k in range(1, 102)]

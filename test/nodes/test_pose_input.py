@@ -162,7 +162,13 @@ def test_old_poses_are_stale_although_they_arrive(mocap):
     mocap.graph.wait_for(noticed, 20.0, "poses found out of order")
     stamps = [stamp_ns(message) for message in mocap.odometry.messages]
     assert stamps == sorted(stamps)
-    assert "synchronise" in mocap.wait_status(PoseStatus.STATUS_STALE).text
+
+    def found_old():
+        mocap.send(mocap.graph.now_ns() - 150 * MS)
+        return "clocks of both computers" in mocap.text
+
+    mocap.graph.wait_for(found_old, 20.0, "a text about the clocks")
+    assert mocap.status.last.status == PoseStatus.STATUS_STALE
 
 
 def test_status_comes_regularly_and_counts(mocap):

@@ -68,7 +68,7 @@ ROWS = (
         short=True,
     ),
     Row("noise of 5 mm for 2 s", PoseFault("pose_noise", 2.0, 0.005), None),
-    Row("50 ms later for 2 s", PoseFault("pose_delay", 2.0, 0.05), None),
+    Row("50 ms later for 2 s", PoseFault("pose_delay", 2.0, 0.05), None, back_within_s=1.0),
     Row("wrong frame for 1 s", PoseFault("pose_frame", 1.0), True, True, "frame 'elsewhere'"),
     Row(
         "quaternion of length 0.5 for 1 s",
