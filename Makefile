@@ -28,7 +28,7 @@ help:
 	  'make lint    style, types and the import rules' \
 	  'make bench   time control step, dynamics and lockstep; results in out/bench.json' \
 	  'make faults  try driver and mock with every fault; table in out/faults.md  SCENARIO=name for one' \
-	  'make pose-faults  the same for the motion capture, on the whole graph; table in out/pose_faults.md' \
+	  'make pose-faults  the same for the motion capture; table in out/pose_faults.md  FAULT=part-of-name' \
 	  'make heads   200 head trajectories and 100 hostile references in lockstep; table in out/heads.md' \
 	  '             GRAPH=1: some of them through all nodes, by the wall clock' \
 	  'make fuzz    a million random packets against the mock and the driver  PACKETS=n' \

@@ -35,6 +35,8 @@ from snake_control.nodes.process import run
 _STATUS_PERIOD_S = 0.1
 _LOOK_PERIOD_S = 1.0
 _RATE_WINDOW_NS = 1_000_000_000
+_LATE = 0.5
+"""A pose that was older on arrival, as a share of its time-out, is late by itself."""
 _NEWS_NS = 2_000_000_000
 """How long the status tells what happened."""
 
@@ -55,7 +57,8 @@ class PoseInput(Node):
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._intake = PoseIntake(self._config, FUTURE_TOLERANCE_S)
         self._fault: Rejection | None = None
-        self._fault_ns = self._accepted_ns = 0
+        self._fault_ns = 0
+        self._age_on_arrival_s = 0.0
         self._news, self._news_ns = "", 0
         self._arrivals: collections.deque[int] = collections.deque()
         self._published: Verdict | None = None
@@ -101,7 +104,8 @@ class PoseInput(Node):
         else:
             result = self._intake.refuse(measured)
         if isinstance(result, HeadEstimate):
-            self._fault, self._accepted_ns = None, self._steady_ns()
+            self._fault = None
+            self._age_on_arrival_s = (now - result.stamp_ns) * 1e-9
             self._publish_odometry(result)
         elif result.reason.is_fault:
             self._fault, self._fault_ns = result, self._steady_ns()
@@ -139,8 +143,11 @@ class PoseInput(Node):
         if age <= self._config.timeout_s:
             return Verdict(PoseStatus.STATUS_VALID, none, "valid", remark)
         text = f"the last good pose is {age:.2f} s old (limit {self._config.timeout_s:g} s)"
-        if steady_ns - self._accepted_ns <= self._timeout_ns:
-            text += " though it has just arrived: are the clocks of both computers synchronised?"
+        if self._age_on_arrival_s > _LATE * self._config.timeout_s:
+            text += (
+                f", {self._age_on_arrival_s:.2f} s when it came: are the clocks of both computers "
+                "synchronised?"
+            )
         return Verdict(PoseStatus.STATUS_STALE, none, text, remark)
 
     def _report(self) -> None:

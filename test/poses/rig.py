@@ -23,8 +23,8 @@ from support.whole_graph import WholeGraph
 VELOCITY_M_S = 0.02
 _BEFORE_S = 1.0
 _AFTER_S = 1.5
-_LONGEST_S = 20.0
-_NEAR_M = 0.01
+_LONGEST_S = 30.0
+_NEAR_M = 0.02
 
 _CONTROLLER = {
     getattr(ControllerState, name): name.removeprefix("STATUS_")
