@@ -48,8 +48,8 @@ def feeds(config: PoseInputConfig) -> list[Feed]:
     if config.source == "tf":
         frames = _Frames(config)
         return [
-            Feed(_loaded(topics.TF), frames.take),
-            Feed(_loaded(topics.TF_STATIC), frames.take_static),
+            Feed(_loaded(topics.MOCAP_TF), frames.take),
+            Feed(_loaded(topics.MOCAP_TF_STATIC), frames.take_static),
         ]
     topic, convert = {
         "pose": (topics.MOCAP_POSE, from_pose),

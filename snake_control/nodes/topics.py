@@ -158,7 +158,7 @@ MOCAP_NAMED_POSES = ForeignTopic(
     "sudo apt install ros-jazzy-motion-capture-tracking-interfaces",
 )
 # Absolute by ROS convention, and with many senders.
-TF = ForeignTopic(
+MOCAP_TF = ForeignTopic(
     "/tf",
     "tf2_msgs",
     "TFMessage",
@@ -167,8 +167,8 @@ TF = ForeignTopic(
     ),
     "sudo apt install ros-jazzy-tf2-msgs",
 )
-TF_STATIC = dataclasses.replace(
-    TF, name="/tf_static", qos=_reliable(100, DurabilityPolicy.TRANSIENT_LOCAL)
+MOCAP_TF_STATIC = dataclasses.replace(
+    MOCAP_TF, name="/tf_static", qos=_reliable(100, DurabilityPolicy.TRANSIENT_LOCAL)
 )
 HEAD_ODOMETRY = Topic("head/odometry", Odometry, _STATE)
 HEAD_STATUS = Topic("head/status", PoseStatus, _STATE)

@@ -30,7 +30,7 @@ COVARIANCE = np.diag([1e-6, 2e-6, 3e-6, 4e-6, 5e-6, 6e-6])
 FOREIGN = {
     "rigid_bodies": topics.MOCAP_RIGID_BODIES,
     "named_poses": topics.MOCAP_NAMED_POSES,
-    "tf": topics.TF,
+    "tf": topics.MOCAP_TF,
 }
 
 
