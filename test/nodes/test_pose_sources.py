@@ -200,7 +200,9 @@ def test_a_source_is_heard(source):
         lever = Rotation.from_quat(XYZW).apply([0.0, 0.0, 0.1])
         np.testing.assert_allclose(array(last.pose.pose.position), PLACE - lever, atol=1e-9)
         graph.wait_for(
-            lambda: status.last and status.last.status == PoseStatus.STATUS_VALID, 20.0, "validity"
+            lambda: arrived() and status.last and status.last.status == PoseStatus.STATUS_VALID,
+            20.0,
+            "validity",
         )
         if source in ("pose_with_covariance", "odometry"):
             # Once the unknown speed of the start has faded.
