@@ -30,6 +30,7 @@ from snake_control.config.nodes import (
 from snake_control.config.obstacles import Circle
 from snake_control.config.parameter import Parameter
 from snake_control.config.pose_input import PoseInputConfig
+from snake_control.config.postures import PosturesConfig
 from snake_control.config.presets import PRESETS
 from snake_control.config.robot import RobotConfig, ServosConfig
 from snake_control.config.sub_tasks import BASE_SUB_TASKS, HEAD_SUB_TASKS
@@ -48,6 +49,7 @@ __all__ = [
     "MockBusConfig",
     "Parameter",
     "PoseInputConfig",
+    "PosturesConfig",
     "RobotConfig",
     "ScpControllerConfig",
     "ServosConfig",

@@ -20,6 +20,12 @@ from snake_control.config.nodes import (
 )
 from snake_control.config.parameter import Parameter, parameters
 from snake_control.config.pose_input import PoseInputConfig
+from snake_control.config.postures import (
+    GROUP,
+    PosturesConfig,
+    posture_parameter,
+    postures_from,
+)
 from snake_control.config.robot import RobotConfig, ServosConfig
 from snake_control.config.supervisor import SupervisorConfig
 from snake_control.config.yaml_file import matches, read_sections
@@ -42,9 +48,9 @@ _NODE_GROUPS: dict[str, type] = {
     "mock_bus": MockBusConfig,
 }
 _SHARED_GROUPS_OF_NODE: dict[str, tuple[str, ...]] = {
-    "bus_driver": ("robot", "servos"),
+    "bus_driver": ("robot", "servos", GROUP),
     "pose_input": (),
-    "scp_controller": ("robot", "controller", "supervisor"),
+    "scp_controller": ("robot", "controller", "supervisor", GROUP),
     "trajectory_generator": ("robot", "controller", "supervisor"),
     "keyboard_teleop": (),
     "description": ("robot",),
@@ -64,6 +70,7 @@ class Config:
     servos: ServosConfig
     controller: ControllerConfig
     supervisor: SupervisorConfig
+    postures: PosturesConfig
     bus_driver: BusDriverConfig
     pose_input: PoseInputConfig
     scp_controller: ScpControllerConfig
@@ -80,9 +87,9 @@ def load(
     """Read parameter files for one robot, later ones winning over earlier ones.
 
     Sections that several kinds of nodes match (``/**``) may hold the shared groups ``robot``,
-    ``servos``, ``controller`` and ``supervisor``, and any node's own parameters; a section of one
-    node holds what that node knows. Sections of other namespaces and of foreign nodes are left
-    alone.
+    ``servos``, ``controller``, ``supervisor`` and ``postures``, and any node's own parameters; a
+    section of one node holds what that node knows. Sections of other namespaces and of foreign
+    nodes are left alone.
 
     Args:
         paths: ROS parameter files.
@@ -104,11 +111,11 @@ def load(
             if not kinds:
                 _refuse_misspelt(pattern)
                 continue
-            known = known_parameters(kinds)
+            known = known_parameters(kinds, values)
             for field, value in values.items():
                 if not is_ros_parameter(field):
                     refuse_unknown(field, value, known)
-                if field.partition(".")[0] in _SHARED_GROUPS:
+                if _is_shared(field):
                     shared[field] = value
                 for kind in kinds:
                     if field in known_parameters((kind,)):
@@ -129,11 +136,11 @@ def from_parameters(node: str, values: Mapping[str, Any]) -> Config:
     Raises:
         ConfigError: as ``load``.
     """
-    known = known_parameters((node,))
+    known = known_parameters((node,), values)
     for field, value in values.items():
         if not is_ros_parameter(field):
             refuse_unknown(field, value, known)
-    shared = {f: v for f, v in values.items() if f.partition(".")[0] in _SHARED_GROUPS}
+    shared = {f: v for f, v in values.items() if _is_shared(f)}
     own = {name: dict(values) if name == node else {} for name in _NODE_GROUPS}
     config = _build(shared, own)
     if "servos" in _SHARED_GROUPS_OF_NODE[node]:
@@ -141,13 +148,24 @@ def from_parameters(node: str, values: Mapping[str, Any]) -> Config:
     return config
 
 
-def known_parameters(nodes: Iterable[str]) -> dict[str, Parameter]:
-    """Return what the given kinds of nodes declare: flat name to description, in file order."""
+def known_parameters(nodes: Iterable[str], given: Iterable[str] = ()) -> dict[str, Parameter]:
+    """Return what the given kinds of nodes declare: flat name to description, in file order.
+
+    Args:
+        nodes: kinds of nodes.
+        given: fields that are given; those of a group whose names are free are known, too.
+
+    Raises:
+        ConfigError: such a name is none.
+    """
     known: dict[str, Parameter] = {}
-    for node in nodes:
-        for group in _SHARED_GROUPS_OF_NODE[node]:
+    groups = [group for node in nodes for group in _SHARED_GROUPS_OF_NODE[node]]
+    for group in groups:
+        if group != GROUP:
             for name, item in parameters(_SHARED_GROUPS[group]).items():
                 known[f"{group}.{name}"] = item
+    if GROUP in groups:
+        known.update((f, item) for f in given if (item := posture_parameter(f)) is not None)
     for node in nodes:
         known.update(parameters(_NODE_GROUPS[node]))
     return known
@@ -171,6 +189,11 @@ def refuse_unknown(field: str, value: object, known: Iterable[str]) -> None:
     near = difflib.get_close_matches(field, known, n=1)
     hint = f"did you mean {near[0]}?" if near else "no such parameter"
     raise ConfigError(field, value, f"unknown parameter; {hint}")
+
+
+def _is_shared(field: str) -> bool:
+    group = field.partition(".")[0]
+    return group in _SHARED_GROUPS or group == GROUP
 
 
 def _refuse_misspelt(pattern: str) -> None:
@@ -236,10 +259,13 @@ def _build(shared: Mapping[str, Any], own: Mapping[str, Mapping[str, Any]]) -> C
     robot: RobotConfig = groups["robot"]
     groups["servos"] = ServosConfig.for_joints(groups["servos"], robot.joints)
     groups["controller"] = ControllerConfig.for_scps(groups["controller"], len(robot.scp_joints))
+    groups[GROUP] = postures_from(
+        robot, {f: v for f, v in shared.items() if f.partition(".")[0] == GROUP}
+    )
     for node, cls in _NODE_GROUPS.items():
         names = parameters(cls)
         groups[node] = _group(cls, "", {f: v for f, v in own[node].items() if f in names})
-    groups["bus_driver"] = groups["bus_driver"].for_robot(robot)
+    groups["bus_driver"] = groups["bus_driver"].for_robot(robot, groups[GROUP])
     return Config(**groups)
 
 

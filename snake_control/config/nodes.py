@@ -6,6 +6,7 @@ import dataclasses
 import math
 
 from snake_control.config.parameter import parameter
+from snake_control.config.postures import PosturesConfig
 from snake_control.config.robot import RobotConfig, per_joint
 from snake_control.errors import ConfigError
 
@@ -68,6 +69,9 @@ class BusDriverConfig:
         "where the joints stand when torque goes off, one for all or for each joint [rad]",
         low=-2 * math.pi,
         high=2 * math.pi,
+    )
+    lowering_posture: str = parameter(
+        "", "the same by name, one of the group postures; then lowering_angles_rad counts no more"
     )
     lowering_speed_rad_s: float = parameter(
         0.2,
@@ -137,15 +141,17 @@ class BusDriverConfig:
                 f"more than voltage_low_warn_v = {self.voltage_low_warn_v:g}",
             )
 
-    def for_robot(self, robot: RobotConfig) -> BusDriverConfig:
+    def for_robot(self, robot: RobotConfig, postures: PosturesConfig) -> BusDriverConfig:
         """Return this with one lowering angle for each joint.
 
         Raises:
             ConfigError: as many as there are joints, or one; and inside the joints' ranges if they
-                are to be used.
+                are to be used; or no posture of that name.
         """
         field = "lowering_angles_rad"
         angles = per_joint(field, self.lowering_angles_rad, robot.joints)
+        if self.lowering_posture:
+            angles = postures.angles("lowering_posture", self.lowering_posture)
         if self.lower_before_torque_off:
             for i, angle in enumerate(angles):
                 lower, upper = robot.joint_range(i + 1)

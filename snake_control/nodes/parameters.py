@@ -68,13 +68,13 @@ class NodeParameters:
         self._node = node
         self._kind = kind
         self._on_change = on_change
-        self._known = known_parameters((kind,))
         self._prepare = prepare
         self._following = False
         self._checked: tuple[Config, Any] | None = None
         given = {n: p.value for n, p in node.get_parameters_by_prefix("").items()}
         # A file may serve all nodes through one /** section.
-        known_to_any = known_parameters(node_kinds())
+        self._known = known_parameters((kind,), given)
+        known_to_any = known_parameters(node_kinds(), given)
         for name, value in given.items():
             if is_ros_parameter(name):
                 continue

@@ -12,6 +12,7 @@ from scipy.interpolate import CubicSpline
 from scipy.special import ellipj, ellipk
 
 from snake_control.control.reference import Reference
+from snake_control.trajectory.rest_to_rest import RestToRest
 
 Array = NDArray[np.float64]
 
@@ -202,17 +203,12 @@ class Along:
         """
         self.path = path
         self._start = start
-        # A ramp of the form sin^2 takes twice as long as one of constant acceleration.
-        self.ramp = 2.0 * speed / acceleration
-        if speed * self.ramp > path.length:
-            self.ramp = math.sqrt(2.0 * path.length / acceleration)
-            speed = path.length / self.ramp
-        self._speed = speed
-        self.duration = path.length / speed + self.ramp
+        self._profile = RestToRest(path.length, speed, acceleration)
+        self.ramp, self.duration = self._profile.ramp, self._profile.duration
 
     def sample(self, t: float) -> Reference:
         """Return pose, rate and acceleration at time ``t`` [s]."""
-        s, rate, acceleration = self._progress(t - self._start)
+        s, rate, acceleration = self._profile.at(t - self._start)
         point = self.path.at(s)
         return Reference(
             point.w, rate * point.by_s, acceleration * point.by_s + rate**2 * point.by_s2
@@ -220,7 +216,7 @@ class Along:
 
     def progress(self, t: float) -> float:
         """Return the length that is behind it at time ``t`` since its start [m]."""
-        return self._progress(t)[0]
+        return self._profile.at(t).s
 
     def moments(self) -> Array:
         """Return times from begin to end, (k,) [s]."""
@@ -228,24 +224,3 @@ class Along:
         cruise = np.linspace(self.ramp, self.duration - self.ramp, samples)
         ramp = np.linspace(0.0, self.ramp, _SAMPLES)
         return np.concatenate((ramp, cruise, self.duration - ramp[::-1]))
-
-    def _progress(self, t: float) -> tuple[float, float, float]:
-        if t >= self.duration:
-            return self.path.length, 0.0, 0.0
-        if t > self.duration - self.ramp:
-            s, rate, acceleration = self._ramped(self.duration - t)
-            return self.path.length - s, rate, -acceleration
-        return self._ramped(max(t, 0.0))
-
-    def _ramped(self, t: float) -> tuple[float, float, float]:
-        """Return length, speed and acceleration from rest, after ``t`` [s]."""
-        ramp, speed = self.ramp, self._speed
-        if t >= ramp:
-            return speed * (t - 0.5 * ramp), speed, 0.0
-        k = math.tau / ramp
-        # The integrals of (2 speed / ramp) sin^2(k t / 2).
-        return (
-            speed / ramp * (0.5 * t * t - (1.0 - math.cos(k * t)) / k**2),
-            speed / ramp * (t - math.sin(k * t) / k),
-            speed / ramp * (1.0 - math.cos(k * t)),
-        )

@@ -139,6 +139,13 @@ CASES = {
         "wheelless_links",
         "1 to 9",
     ),
+    # Postures.
+    "angles of some joints": ("postures", {"up": [0.1, 0.2]}, "up", "give 11 entries"),
+    "posture beyond a range": ("postures", {"up": [0.1] * 10 + [-2.7]}, "up[10]", "joint 11, -2.6"),
+    "posture of texts": ("postures", {"up": ["high"]}, "up[0]", "give a number"),
+    "posture that is built in": ("postures", {"flat": [0.1]}, "flat", "built in: all joints at 0"),
+    "posture without a name": ("postures", {"": [0.1]}, "", "a letter first"),
+    "posture in a posture": ("postures", {"up": {"up": [0.1]}}, "up.up", "a letter first"),
     # Values.
     "range beyond the servo": (
         "robot",
@@ -227,6 +234,13 @@ NODE_CASES = {
         "lowering_angles_rad[0]",
         "range of joint 1",
     ),
+    "lowering to nowhere": (
+        "bus_driver",
+        "lowering_posture: lieing",
+        "lowering_posture",
+        "no such posture; there are: flat, start, lying, look_ahead",
+    ),
+    "postures of another node": ("pose_input", "postures.up: [0.1]", "postures.up", "known"),
     "lowering at a crawl": (
         "bus_driver",
         "lowering_speed_rad_s: 0.001",
