@@ -188,6 +188,38 @@ class ScpControllerConfig:
     max_rotation_error_rad: float = parameter(
         2.5, "the same for roll, pitch and yaw, each [rad]", low=0.01, high=4.0
     )
+    posture_speed_rad_s: float = parameter(
+        0.3,
+        "go_to_posture and reshape: speed of the fastest joint, if none is given [rad/s]",
+        low=1e-3,
+        high=10.0,
+    )
+    posture_acceleration_rad_s2: float = parameter(
+        1.0,
+        "go_to_posture and reshape: largest acceleration of a joint [rad/s^2]",
+        low=0.01,
+        high=100.0,
+    )
+    posture_gain_per_s: float = parameter(
+        2.0,
+        "go_to_posture and reshape: speed for each radian that a joint is away from where it "
+        "should be [1/s]",
+        low=0.1,
+        high=20.0,
+    )
+    posture_tolerance_rad: float = parameter(
+        0.02,
+        "go_to_posture and reshape: every joint has arrived within this, four counts of an AX-12 "
+        "[rad]",
+        low=1e-3,
+        high=0.5,
+    )
+    posture_patience_s: float = parameter(
+        5.0,
+        "go_to_posture and reshape: how long nothing may come nearer before they give up [s]",
+        low=0.5,
+        high=60.0,
+    )
     enabled: bool = parameter(True, "follow references from the start (see ~/enable)")
     frame_id: str = parameter("world", "frame in which head pose and reference are given")
 

@@ -33,13 +33,18 @@ class Limited(NamedTuple):
 
 
 class JointLimits:
-    """The limits of one robot."""
+    """The limits of one robot.
+
+    Attributes:
+        speeds: largest speed of each joint, (n-1,) [rad/s].
+        lower, upper: ends of the joints' ranges, less what is kept of them, (n-1,) [rad].
+    """
 
     def __init__(self, robot: RobotConfig) -> None:
-        self._speed = np.array(robot.joint_speed_limits_rad_s)
+        self.speeds = np.array(robot.joint_speed_limits_rad_s)
         bounds = np.array(robot.joint_limits_rad).reshape(-1, 2)
-        self._lower = bounds[:, 0] + RANGE_MARGIN_RAD
-        self._upper = bounds[:, 1] - RANGE_MARGIN_RAD
+        self.lower = bounds[:, 0] + RANGE_MARGIN_RAD
+        self.upper = bounds[:, 1] - RANGE_MARGIN_RAD
 
     def apply(self, phi: Array, u: Array) -> Limited:
         """Limit joint velocities.
@@ -54,11 +59,11 @@ class JointLimits:
         """
         range_limited: tuple[int, ...] = ()
         # The largest of a list is quicker than numpy's of a few numbers.
-        if max(np.maximum(phi - self._upper, self._lower - phi).tolist()) >= 0.0:
-            outward = ((phi >= self._upper) & (u > 0)) | ((phi <= self._lower) & (u < 0))
+        if max(np.maximum(phi - self.upper, self.lower - phi).tolist()) >= 0.0:
+            outward = ((phi >= self.upper) & (u > 0)) | ((phi <= self.lower) & (u < 0))
             range_limited = _joints(outward)
             u = np.where(outward, 0.0, u)
-        excess = np.abs(u) / self._speed
+        excess = np.abs(u) / self.speeds
         worst = max(excess.tolist())
         if worst <= 1.0:
             return Limited(u, 1.0, (), range_limited)

@@ -27,6 +27,7 @@ class RestToRest:
 
     Attributes:
         length: of the motion.
+        speed: largest speed that is reached.
         duration: of the motion [s].
         ramp: how long speeding up takes, and slowing down [s].
     """
@@ -45,7 +46,7 @@ class RestToRest:
         if speed * self.ramp > length:
             self.ramp = math.sqrt(2.0 * length / acceleration)
             speed = length / self.ramp
-        self._speed = speed
+        self.speed = speed
         self.duration = length / speed + self.ramp
 
     def at(self, t: float) -> Progress:
@@ -59,7 +60,7 @@ class RestToRest:
 
     def _ramped(self, t: float) -> Progress:
         """Return length, speed and acceleration from rest, after ``t`` [s]."""
-        ramp, speed = self.ramp, self._speed
+        ramp, speed = self.ramp, self.speed
         if t >= ramp:
             return Progress(speed * (t - 0.5 * ramp), speed, 0.0)
         k = math.tau / ramp
