@@ -165,7 +165,10 @@ def known_parameters(nodes: Iterable[str], given: Iterable[str] = ()) -> dict[st
             for name, item in parameters(_SHARED_GROUPS[group]).items():
                 known[f"{group}.{name}"] = item
     if GROUP in groups:
-        known.update((f, item) for f in given if (item := posture_parameter(f)) is not None)
+        for field in given:
+            posture = posture_parameter(field)
+            if posture is not None:
+                known[field] = posture
     for node in nodes:
         known.update(parameters(_NODE_GROUPS[node]))
     return known

@@ -104,6 +104,10 @@ class JointMotion:
         """Slow down to rest."""
         self._stopping = True
 
+    def pause(self) -> None:
+        """Note that the joints rest for a moment: what comes next begins at rest."""
+        self._pace = 0.0
+
     def step(self, phi: Array, t: float, allowed: float = 1.0) -> MotionStep:
         """Return what to do now.
 

@@ -102,6 +102,10 @@ class PostureMotion:
         """Slow down to rest."""
         self._motion.stop()
 
+    def pause(self) -> None:
+        """Note that the joints rest for a moment."""
+        self._motion.pause()
+
     def step(self, phi: Array, t: float) -> PostureStep:
         """Return what to do now.
 

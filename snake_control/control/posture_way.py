@@ -143,7 +143,7 @@ class PostureWays:
         if there[worst] < 0.0:
             what = self._margins.words(worst, there[worst])
             return Found((), None, {}, f"the posture itself: {what}")
-        refused = []
+        refused: list[str] = []
         for order, corners in self._orders(start, goal):
             least, hindrance = self._look(corners)
             if hindrance is None:

@@ -34,7 +34,10 @@ class Step:
         reference_scale: how fast the reference may go on, 0..1.
         phi, w, w_d, w_d_dot: inputs as far as they could be used, else NaN.
         controlled: components of w, from 0, that the controller moves (not all, if planar).
-        result: what the control law decided; ``None`` if the joints are commanded to rest.
+        result: what the control law decided; ``None`` if it decided nothing.
+        u: what the joints are commanded where the control law decided nothing, (n-1,) [rad/s];
+            ``None`` if they are to rest.
+        d_min: margin against falling, where the control law decided nothing [m].
         joint_states_age, head_age, reference_age: ages of the inputs [s].
         head_waited: how long the head pose had been here when the step began [s].
     """
@@ -50,6 +53,8 @@ class Step:
     reference_scale: float = 0.0
     controlled: tuple[int, ...] = (0, 1, 2, 3, 4, 5)
     result: SupervisedResult | None = None
+    u: Array | None = None
+    d_min: float = math.nan
     joint_states_age: float = math.inf
     head_age: float = math.inf
     reference_age: float = math.inf
@@ -179,11 +184,15 @@ class ControllerMessages:
         self.parameter_changes = 0
 
     def command(self, step: Step) -> JointVelocityCommand:
-        """Return the command of a step: the control law's velocities, or zeros."""
+        """Return the command of a step: velocities of the control law or of a motion, or zeros."""
         message = self._command
         _stamp(message, step.stamp_ns)
-        message.velocity = self._at_rest if step.result is None else _array(step.result.u)
+        message.velocity = self._resting(step) if step.result is None else _array(step.result.u)
         return message
+
+    def _resting(self, step: Step) -> array.array[float]:
+        """Return the command where the control law decided nothing."""
+        return self._at_rest if step.u is None else _array(step.u)
 
     def state(self, step: Step, gains: ControllerConfig, step_time: float) -> ControllerState:
         """Return everything a step decided; NaN where it decided nothing.
@@ -215,11 +224,12 @@ class ControllerMessages:
         message.step_time = step_time
         result = step.result
         if result is None:
-            message.u_unlimited = message.u = self._at_rest
+            message.u_unlimited = message.u = self._resting(step)
             message.phi_tilde_dot_d = self._no_scp
             message.speed_scale = message.feedback_scale = message.scp_scale = 1.0
             message.speed_limited = message.range_limited = []
-            message.v_h = message.v_b1 = message.d_min = math.nan
+            message.v_h = message.v_b1 = math.nan
+            message.d_min = float(step.d_min)
             message.sigma_min_b_tilde = message.sigma_min_a_hat = math.nan
             message.damping = message.singular_nearness = math.nan
             message.singular_shape = ""

@@ -45,6 +45,7 @@ _STOPS = (
     ControllerState.STATUS_FAULT,
     ControllerState.STATUS_ERROR_TOO_LARGE,
     ControllerState.STATUS_STOPPED,
+    ControllerState.STATUS_POSTURE,
 )
 _REFUSALS = (Status.INVALID, Status.NO_HEAD, Status.UNREACHABLE)
 _REHEARSAL_HZ = 25.0

@@ -27,10 +27,11 @@ class Fault(enum.IntEnum):
 
 @dataclasses.dataclass(frozen=True)
 class Problem:
-    """Why an input cannot be used; the text names it."""
+    """Why an input cannot be used; the text names its topic."""
 
     fault: Fault
     text: str
+    topic: str
 
 
 class Input(Generic[Value]):
@@ -80,17 +81,21 @@ class Input(Generic[Value]):
     def problem(self, now_ns: int) -> Problem | None:
         """Return why the newest message cannot be used at ``now_ns``, ``None`` if it can."""
         if self._stamp_ns is None:
-            return Problem(Fault.WAITING, f"waiting for {self.name}")
+            return Problem(Fault.WAITING, f"waiting for {self.name}", self.name)
         if self._fault:
-            return Problem(Fault.INVALID, f"{self.name}: {self._fault}")
+            return Problem(Fault.INVALID, f"{self.name}: {self._fault}", self.name)
         age = self.age(now_ns)
         if age < -FUTURE_TOLERANCE_S:
             # It would look fresh for as long as the clocks differ.
             return Problem(
-                Fault.INVALID, f"{self.name}: stamped {-age:.3f} s ahead of this computer's clock"
+                Fault.INVALID,
+                f"{self.name}: stamped {-age:.3f} s ahead of this computer's clock",
+                self.name,
             )
         if age > self._timeout_s:
             return Problem(
-                Fault.STALE, f"{self.name} is {age:.2f} s old (limit {self._timeout_s:g} s)"
+                Fault.STALE,
+                f"{self.name} is {age:.2f} s old (limit {self._timeout_s:g} s)",
+                self.name,
             )
         return None

@@ -31,6 +31,7 @@ STATUS_WORDS = {
     ControllerState.STATUS_RECOVERING: "recovering",
     ControllerState.STATUS_HOLDING: "holding",
     ControllerState.STATUS_STOPPED: "stopped",
+    ControllerState.STATUS_POSTURE: "to posture",
 }
 FOLLOWING = (
     ControllerState.STATUS_TRACKING,

@@ -26,8 +26,10 @@ from snake_control.nodes import topics
 from snake_control.nodes.controller_messages import ControllerMessages, Step, judge, too_far
 from snake_control.nodes.conversions import head_motion, joint_motion, reference_from
 from snake_control.nodes.inputs import Fault, Input, Problem
+from snake_control.nodes.joint_action import Surroundings
 from snake_control.nodes.markers import RobotMarkers
 from snake_control.nodes.parameters import NodeParameters
+from snake_control.nodes.posture_action import PostureAction
 from snake_control.nodes.process import run
 
 _MARKERS_PERIOD_S = 0.1
@@ -48,6 +50,7 @@ _GOOD = (
     ControllerState.STATUS_TRACKING,
     ControllerState.STATUS_LIMITED,
     ControllerState.STATUS_RECOVERING,
+    ControllerState.STATUS_POSTURE,
 )
 # What a driver does that takes commands; a dry run takes them for show.
 _TAKES = (BusState.STATE_MOVING, BusState.STATE_DRY_RUN)
@@ -75,6 +78,7 @@ class ScpControllerNode(Node):
         self._status: int | None = None
         self._bus: tuple[int, BusState] | None = None
         self._stopped = ""
+        self._overtaken = ""
         self._messages = ControllerMessages(config.robot, own.frame_id)
         self._drawn = RobotMarkers(config.robot, own.frame_id)
         self._latest = Step.at(0, config.robot)
@@ -119,11 +123,16 @@ class ScpControllerNode(Node):
         t = topics.MARKERS
         self._markers = self.create_publisher(t.type, t.name, t.qos)
         self.create_service(topics.ENABLE.type, topics.ENABLE.name, self._on_enable)
+        self._actions = (PostureAction(self, lambda: self._configured.config, self._busy),)
         self.create_timer(1.0 / own.rate_hz, self._on_timer, clock=self._steady)
         self.create_timer(_MARKERS_PERIOD_S, self._publish_markers, clock=self._steady)
 
     def _hear_bus(self, message: BusState) -> None:
         self._bus = (self._steady.now().nanoseconds, message)
+
+    def _busy(self) -> str:
+        """Return which action has a goal; empty if none has."""
+        return next((action.name for action in self._actions if action.active), "")
 
     def _on_parameters(self, config: Config) -> None:
         self._gains = config.controller
@@ -134,7 +143,7 @@ class ScpControllerNode(Node):
 
     def _on_enable(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
         self._enabled = request.data
-        self._stopped = ""
+        self._stopped = self._overtaken = ""
         response.success = True
         response.message = "enabled" if self._enabled else "disabled: zero velocity"
         self.get_logger().info(response.message)
@@ -191,7 +200,8 @@ class ScpControllerNode(Node):
             step.w_d = np.concatenate([reference.w_d[:3], self._rpy_d])
             step.w_d_dot = reference.w_d_dot
 
-        bus = self._heed_bus(referenced=len(problems) == len(others))
+        referenced = len(problems) == len(others)
+        bus = self._heed_bus(referenced)
         if not self._enabled:
             step.status = ControllerState.STATUS_DISABLED
             step.text = f"disabled by ~/{topics.ENABLE.name[2:]}"
@@ -199,7 +209,10 @@ class ScpControllerNode(Node):
         elif bus is not None:
             step.status, step.text = bus
             step.reasons = (ControllerState.REASON_BUS,)
-        elif problems:
+        rests = step.text
+        if self._act(step, rests, others, referenced) or rests:
+            return step
+        if problems:
             step.status = _STATUS_OF_FAULT[max(problem.fault for problem in problems)]
             step.text = "; ".join(problem.text for problem in problems)
             faults = sorted({problem.fault for problem in problems}, reverse=True)
@@ -215,6 +228,53 @@ class ScpControllerNode(Node):
         else:
             self._control(step, np.concatenate([w_dot, phi_dot]))
         return step
+
+    def _act(self, step: Step, rests: str, problems: list[Problem], referenced: bool) -> bool:
+        """Let an action move the joints; return whether it, or what it leaves, decides the step.
+
+        A reference that came meanwhile is not followed afterwards, either: it has to begin anew.
+
+        Args:
+            step: the step so far.
+            rests: why the joints have to rest, empty if they have not.
+            problems: of head pose and joint states.
+            referenced: whether there is a reference.
+        """
+        around = Surroundings(
+            t=self._seconds(),
+            missing={problem.topic: problem.text for problem in problems},
+            hindrance=rests,
+            bus_waits=self._bus_waits(),
+            referenced=referenced,
+        )
+        acted = any(action.step(step, around) for action in self._actions)
+        if referenced and any(action.moving for action in self._actions):
+            self._overtaken = self._busy()
+        if acted:
+            return True
+        if not referenced:
+            self._overtaken = ""
+        if not self._overtaken or rests:
+            return False
+        step.status = ControllerState.STATUS_STOPPED
+        step.text = (
+            f"the reference came while {self._overtaken} moved the joints: stop it and start it "
+            "again"
+        )
+        step.reasons = (ControllerState.REASON_JOINT_MOTION,)
+        return True
+
+    def _seconds(self) -> float:
+        return (self._steady.now().nanoseconds - self._origin_ns) * 1e-9
+
+    def _bus_waits(self) -> str:
+        """Return what a driver that is heard waits for before it takes motion, empty for none."""
+        if self._bus is None:
+            return ""
+        heard_ns, state = self._bus
+        if self._steady.now().nanoseconds - heard_ns > _BUS_SILENT_NS or state.state in _TAKES:
+            return ""
+        return f"bus_driver: {state.text}"
 
     def _heed_bus(self, referenced: bool) -> tuple[int, str] | None:
         """Return status and text if the bus driver does not do what it is told.
@@ -249,9 +309,8 @@ class ScpControllerNode(Node):
         q = np.concatenate([step.w, step.phi])
         given = self._reference.value
         reference = Reference(step.w_d, step.w_d_dot, time_scale=given.time_scale)
-        t = (self._steady.now().nanoseconds - self._origin_ns) * 1e-9
         try:
-            result = self._controller.step(q, q_dot, reference, t)
+            result = self._controller.step(q, q_dot, reference, self._seconds())
         except NO_ANSWER as error:
             _give_up(step, error)
             return
@@ -280,6 +339,8 @@ class ScpControllerNode(Node):
 
     def close(self) -> None:
         """Leave the joints with a command to rest."""
+        for action in self._actions:
+            action.close()
         now = self.get_clock().now().nanoseconds
         self._command.publish(self._messages.command(Step.at(now, self._robot)))
         # A publisher that is destroyed may take what it has just sent along.

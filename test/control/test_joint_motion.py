@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -153,3 +155,19 @@ def test_a_clock_that_stood_still_for_long_makes_no_jump():
     step = made.step(np.zeros(1), 30.0)
     assert step.progress < 0.05
     assert abs(step.velocities[0]) < 0.2
+
+
+def test_after_a_pause_it_begins_at_rest_again():
+    made = motion([[0.0], [2.0]])
+    phi, speeds = np.zeros(1), []
+    for k in range(120):
+        if 60 <= k < 70:
+            made.pause()
+            continue
+        step = made.step(phi, DT * k)
+        speeds.append(abs(float(step.velocities[0])))
+        phi = phi + DT * step.velocities
+    assert speeds[59] > 0.3
+    assert speeds[60] < 0.15
+    assert max(abs(b - a) for a, b in itertools.pairwise(speeds[60:])) < 2.0 * DT
+    assert speeds[-1] == pytest.approx(0.5, abs=0.02)
