@@ -120,11 +120,11 @@ class JointMotion:
         self._t = t
         lag = float(np.abs(self._way.at(self._own).phi - phi).max(initial=0.0))
         room = self._stopped_from - self._slowed_from
-        wanted = min(allowed, max(0.0, min(1.0, (self._stopped_from - lag) / room)))
+        wanted = max(0.0, min(1.0, (self._stopped_from - lag) / room))
         if self._stopping:
             wanted = 0.0
         change = self._pace_rate * dt
-        self._pace = min(max(wanted, self._pace - change), self._pace + change)
+        self._pace = min(max(wanted, self._pace - change), self._pace + change, allowed)
         self._own = min(self._own + self._pace * dt, self._way.duration)
 
         now = self._way.at(self._own)

@@ -22,9 +22,12 @@ class Reference:
             [m/s^2, rad/s^2]; default 0.
         time_scale: how much slower than planned the reference moves at present, 0..1: its rate is
             time_scale * w_d_dot.
+        phi_tilde_dot_d: wanted SCP velocities, as they are at present, H-SCPs first, (m,) [rad/s];
+            ``None`` to let the sub-tasks decide.
     """
 
     w_d: Array
     w_d_dot: Array
     w_d_ddot: Array = dataclasses.field(default_factory=lambda: np.zeros(6))
     time_scale: float = 1.0
+    phi_tilde_dot_d: Array | None = None

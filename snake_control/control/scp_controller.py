@@ -179,7 +179,8 @@ class ScpController:
                 self.feedforward(reference, error), self.feedback(posture, error), strict=True
             )
         ]
-        phi_tilde_dot_d = self.sub_tasks(posture, w_dot)
+        given = reference.phi_tilde_dot_d
+        phi_tilde_dot_d = self.sub_tasks(posture, w_dot) if given is None else given
         u = posture.k.joint_velocities(w_dot, phi_tilde_dot_d.tolist())
         limited = self._limits.apply(posture.g.q[6:], u)
         return ControlResult(

@@ -104,6 +104,7 @@ class Supervisor:
         self._at_rest = np.zeros(robot.joints)
         self._sub_task_speeds = SUB_TASK_SHARE * np.array(robot.joint_speed_limits_rad_s)
         self._still = [0.0] * len(robot.controlled)
+        self._no_scps = np.zeros(len(robot.scp_joints))
         self.rest()
 
     def rest(self) -> None:
@@ -132,7 +133,9 @@ class Supervisor:
         Args:
             q: [w, phi], (n+5,) [m, rad].
             q_dot: its rate; not used.
-            reference: wanted head pose and rate, at ``reference.time_scale`` of its speed.
+            reference: wanted head pose and rate, at ``reference.time_scale`` of its speed. SCP
+                velocities that it gives take the place of sub-tasks and escape, and are slowed
+                with its rate.
             t: time of a steady clock [s].
 
         Raises:
@@ -146,33 +149,43 @@ class Supervisor:
         phi = posture.g.q[6:]
         at = self._barriers.at(phi)
         self._lift(at)
-        self._dangers = dangers = self._escape.dangers(at, phi, self._dangers)
+        # Whoever gives the velocities of the SCPs has decided what they are used for.
+        given_scps = reference.phi_tilde_dot_d
+        dangers = {} if given_scps is not None else self._escape.dangers(at, phi, self._dangers)
+        self._dangers = dangers
         fade = 1.0 - max(dangers.values(), default=0.0)
         away = self._escape.velocities(posture, dangers) if dangers else 0.0
 
         back = self._law.feedback(posture, error)
         forward = self._law.feedforward(reference, error)
 
-        resting_scps = self._law.sub_tasks(posture, self._still)
-        sub_tasks = fade * self._sub_task_share(posture, resting_scps) * resting_scps
+        if given_scps is None:
+            resting_scps = self._law.sub_tasks(posture, self._still)
+            sub_tasks = fade * self._sub_task_share(posture, resting_scps) * resting_scps
+            given_scps = self._no_scps
+        else:
+            resting_scps = sub_tasks = self._no_scps
 
-        def motion(w_dot: list[float]) -> tuple[Array, Array]:
-            scps = sub_tasks + away
-            if self._law.scps_follow_head:
+        def motion(w_dot: list[float], given: Array) -> tuple[Array, Array]:
+            scps = sub_tasks + away + given
+            if self._law.scps_follow_head and reference.phi_tilde_dot_d is None:
                 scps = scps + self._law.sub_tasks(posture, w_dot) - resting_scps
             return scps, posture.k.joint_velocities(w_dot, scps.tolist())
 
         scale = reference.time_scale
         full = [scale * f + b for f, b in zip(forward, back, strict=True)]
-        phi_tilde_dot_d, wanted = motion(full)
-        scaled = self._scaled(at, wanted, lambda w_dot: motion(w_dot)[1], back, scale)
+        phi_tilde_dot_d, wanted = motion(full, given_scps)
+        scaled = self._scaled(
+            at, wanted, lambda w_dot: motion(w_dot, self._no_scps)[1], back, scale
+        )
         u, accelerating = self._accelerated(at, scaled.u)
         self._u = u
         self._let_reference_go(scaled.reference)
-        # What the head was given of what it should do.
-        given = scaled.reference / scale if scale > 0.0 and any(forward) else scaled.feedback
-        pace = self._reference_scale if any(forward) else scaled.feedback
-        holding = self._holds(pace, any(forward) or any(back), t)
+        # What head and SCPs were given of what they should do.
+        onward = any(forward) or bool(given_scps.any())
+        given = scaled.reference / scale if scale > 0.0 and onward else scaled.feedback
+        pace = self._reference_scale if onward else scaled.feedback
+        holding = self._holds(pace, onward or any(back), t)
         self._bound = scaled.bound or (self._bound if holding else None)
         return SupervisedResult(
             posture=posture,

@@ -128,7 +128,7 @@ def _slowed(result: SupervisedResult, bound: Bound, robot: RobotConfig) -> str:
     }.get(bound.limit, _near(bound.limit, result))
     if result.holding:
         return f"{what}: the head rests"
-    return f"{what}: the head's motion scaled to {result.speed_scale:.2f}"
+    return f"{what}: the motion scaled to {result.speed_scale:.2f}"
 
 
 def _near(limit: Limit, result: SupervisedResult) -> str:

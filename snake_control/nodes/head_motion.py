@@ -46,6 +46,7 @@ _STOPS = (
     ControllerState.STATUS_ERROR_TOO_LARGE,
     ControllerState.STATUS_STOPPED,
     ControllerState.STATUS_POSTURE,
+    ControllerState.STATUS_RESHAPING,
 )
 _REFUSALS = (Status.INVALID, Status.NO_HEAD, Status.UNREACHABLE)
 _REHEARSAL_HZ = 25.0

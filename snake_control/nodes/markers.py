@@ -54,6 +54,8 @@ _LIFETIME = Duration(seconds=0.5).to_msg()
 _UPRIGHT = Rotation.from_euler("x", 90, degrees=True)
 _COLOR_OF_STATUS = {
     ControllerState.STATUS_TRACKING: _GOOD,
+    ControllerState.STATUS_POSTURE: _GOOD,
+    ControllerState.STATUS_RESHAPING: _GOOD,
     ControllerState.STATUS_LIMITED: _NEAR,
     ControllerState.STATUS_RECOVERING: _NEAR,
     ControllerState.STATUS_WAITING: _NEAR,

@@ -32,6 +32,7 @@ STATUS_WORDS = {
     ControllerState.STATUS_HOLDING: "holding",
     ControllerState.STATUS_STOPPED: "stopped",
     ControllerState.STATUS_POSTURE: "to posture",
+    ControllerState.STATUS_RESHAPING: "reshaping",
 }
 FOLLOWING = (
     ControllerState.STATUS_TRACKING,

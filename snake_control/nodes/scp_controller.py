@@ -31,6 +31,9 @@ from snake_control.nodes.markers import RobotMarkers
 from snake_control.nodes.parameters import NodeParameters
 from snake_control.nodes.posture_action import PostureAction
 from snake_control.nodes.process import run
+from snake_control.nodes.reshape_action import ReshapeAction
+
+Array = NDArray[np.float64]
 
 _MARKERS_PERIOD_S = 0.1
 _ACKNOWLEDGED_WITHIN = Duration(seconds=0.2)
@@ -51,6 +54,7 @@ _GOOD = (
     ControllerState.STATUS_LIMITED,
     ControllerState.STATUS_RECOVERING,
     ControllerState.STATUS_POSTURE,
+    ControllerState.STATUS_RESHAPING,
 )
 # What a driver does that takes commands; a dry run takes them for show.
 _TAKES = (BusState.STATE_MOVING, BusState.STATE_DRY_RUN)
@@ -123,7 +127,10 @@ class ScpControllerNode(Node):
         t = topics.MARKERS
         self._markers = self.create_publisher(t.type, t.name, t.qos)
         self.create_service(topics.ENABLE.type, topics.ENABLE.name, self._on_enable)
-        self._actions = (PostureAction(self, lambda: self._configured.config, self._busy),)
+        self._actions = (
+            PostureAction(self, lambda: self._configured.config, self._busy),
+            ReshapeAction(self, lambda: self._configured.config, self._busy, self._control),
+        )
         self.create_timer(1.0 / own.rate_hz, self._on_timer, clock=self._steady)
         self.create_timer(_MARKERS_PERIOD_S, self._publish_markers, clock=self._steady)
 
@@ -226,7 +233,9 @@ class ScpControllerNode(Node):
             step.text = text
             step.reasons = (ControllerState.REASON_ERROR_TOO_LARGE,)
         else:
-            self._control(step, np.concatenate([w_dot, phi_dot]))
+            given = self._reference.value
+            reference = Reference(step.w_d, step.w_d_dot, time_scale=given.time_scale)
+            self._control(step, step.phi, np.concatenate([w_dot, phi_dot]), reference)
         return step
 
     def _act(self, step: Step, rests: str, problems: list[Problem], referenced: bool) -> bool:
@@ -305,10 +314,9 @@ class ScpControllerNode(Node):
         self._stopped = f"bus_driver: {state.text}"
         return ControllerState.STATUS_STOPPED, self._stopped
 
-    def _control(self, step: Step, q_dot: NDArray[np.float64]) -> None:
-        q = np.concatenate([step.w, step.phi])
-        given = self._reference.value
-        reference = Reference(step.w_d, step.w_d_dot, time_scale=given.time_scale)
+    def _control(self, step: Step, phi: Array, q_dot: Array | None, reference: Reference) -> None:
+        """Let the supervised law decide a step, at the measured head pose and angles ``phi``."""
+        q = np.concatenate([step.w, phi])
         try:
             result = self._controller.step(q, q_dot, reference, self._seconds())
         except NO_ANSWER as error:

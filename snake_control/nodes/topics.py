@@ -27,7 +27,7 @@ from rclpy.qos import (
     qos_profile_sensor_data,
 )
 from sensor_msgs.msg import JointState
-from snake_interfaces.action import FollowHeadTrajectory, GoToPosture
+from snake_interfaces.action import FollowHeadTrajectory, GoToPosture, Reshape
 from snake_interfaces.msg import (
     BusState,
     ControllerState,
@@ -219,3 +219,4 @@ RETURN = Service("~/return", Trigger)
 
 FOLLOW_HEAD_TRAJECTORY = Action("follow_head_trajectory", FollowHeadTrajectory)
 GO_TO_POSTURE = Action("go_to_posture", GoToPosture)
+RESHAPE = Action("reshape", Reshape)

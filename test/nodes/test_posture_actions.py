@@ -7,13 +7,14 @@ import itertools
 import numpy as np
 import pytest
 from action_msgs.msg import GoalStatus
-from snake_interfaces.action import FollowHeadTrajectory, GoToPosture
-from snake_interfaces.msg import ControllerState
+from snake_interfaces.action import FollowHeadTrajectory, GoToPosture, Reshape
+from snake_interfaces.msg import BusState, ControllerState
 from std_srvs.srv import SetBool
 
 from snake_control.config import load
 from snake_control.nodes import topics
 from snake_control.nodes.conversions import header, pose_message, stamp_ns
+from snake_control.plant.kinematic import KinematicPlant
 from support.action_client import Goals
 from support.controller_rig import ControllerRig
 from support.graph import CONFIG, Graph
@@ -36,8 +37,31 @@ SUCCEEDED, ABORTED, CANCELED = (
 @pytest.fixture(scope="module")
 def robot(tmp_path_factory):
     with WholeGraph(tmp_path_factory.mktemp("postures")) as robot:
+        robot.bus = robot.graph.subscribe(topics.BUS_STATE)
         robot.postures = Goals(robot.graph, topics.GO_TO_POSTURE)
+        robot.reshapes = Goals(robot.graph, topics.RESHAPE)
+        robot.graph.wait_for(lambda: robot.bus.last, 10.0, "the driver")
         yield robot
+
+
+@pytest.fixture(autouse=True)
+def recovered(request):
+    """Neither a stopped driver, a goal nor a reference is left to a later test."""
+    if "robot" not in request.fixturenames:
+        return
+    robot = request.getfixturevalue("robot")
+    robot.drive(None)
+    for goals in (robot.postures, robot.reshapes):
+        goals.cancel_last()
+    if robot.bus.last.state == BusState.STATE_STOPPED:
+        service = topics.RECOVER
+        robot.graph.call("bus_driver", service, service.type.Request())
+        robot.graph.wait_for(
+            lambda: robot.bus.last.state == BusState.STATE_MOVING, 20.0, "the driver again"
+        )
+    robot.graph.wait_for(
+        lambda: "head/reference" in robot.states.last.text, 20.0, "a controller without reference"
+    )
 
 
 def phi(robot) -> np.ndarray:
@@ -70,10 +94,18 @@ def moving(robot, least: float = 0.1) -> None:
     )
 
 
-def hardest(robot, since_ns: int) -> float:
-    """Largest change of a commanded speed from one cycle to the next [rad/s]."""
-    sent = [np.array(c.velocity) for c in robot.commands.messages if stamp_ns(c) > since_ns]
-    return max(float(np.abs(b - a).max()) for a, b in itertools.pairwise(sent))
+def jerks(robot, since_ns: int) -> float:
+    """Largest change of a commanded speed beyond what braking at twice the plan's acceleration is.
+
+    From one control step of the move to the next [rad/s]; interruptions are none of its own.
+    """
+    steps = [s for s in robot.states.messages if stamp_ns(s) > since_ns]
+    worst = -np.inf
+    for a, b in itertools.pairwise(steps):
+        if a.status == b.status == ControllerState.STATUS_POSTURE:
+            change = float(np.abs(np.subtract(b.u, a.u)).max())
+            worst = max(worst, change - 2.0 * (stamp_ns(b) - stamp_ns(a)) * 1e-9)
+    return worst
 
 
 def test_down_to_lying_flat_and_up_again(robot):
@@ -95,15 +127,15 @@ def test_down_to_lying_flat_and_up_again(robot):
         truth = robot.truth_after(begun)
         assert not any(state.fallen for state in truth)
         assert min(state.d_min for state in truth) > 0.02
-        assert hardest(robot, begun) < 0.15
+        assert jerks(robot, begun) < 0.1
         states = [s for s in robot.states.messages if stamp_ns(s) > begun]
         while_moving = [s for s in states if s.status == ControllerState.STATUS_POSTURE]
-        assert len(while_moving) > 80
+        assert len(while_moving) > 10
         assert all(
             list(s.reasons) == [ControllerState.REASON_JOINT_MOTION] and s.reference_scale == 0.0
             for s in while_moving
         )
-        assert f"go_to_posture ({name}): moving" in while_moving[20].text
+        assert f"go_to_posture ({name}): moving" in while_moving[len(while_moving) // 2].text
         assert min(s.d_min for s in while_moving) > 0.02
         # Afterwards it waits for a reference as before.
         robot.graph.wait_for(
@@ -160,7 +192,7 @@ def test_a_canceled_move_slows_down_to_rest(robot):
     sent.cancel()
     status, result = sent.result()
     assert (status, result.code) == (CANCELED, Posture.CANCELED)
-    assert hardest(robot, begun) < 0.15
+    assert jerks(robot, begun) < 0.1
     np.testing.assert_array_equal(robot.commands.last.velocity, 0.0)
     assert 0.1 < phi(robot)[4] < 1.0
 
@@ -246,31 +278,118 @@ def test_an_emergency_stop_ends_a_move_and_after_its_reset_another_one_may_begin
     bring_to(robot, "start")
 
 
-class Joints:
-    """Joints that do what they are told, as messages of a rig: a robot without motion capture."""
+def test_scps_turn_while_the_head_stands_still(robot):
+    bring_to(robot, "start")
+    begun = robot.graph.now_ns()
+    robot.reshapes.feedback.clear()
+    w = robot.w
+    angles = {"joint_3": 0.2, "joint_8": 0.2, "joint_10": -0.8}
+    status, result = robot.reshapes.do(name=list(angles), angle=list(angles.values()), speed=0.2)
+    assert (status, result.code) == (SUCCEEDED, Reshape.Result.NONE), result.text
+    assert result.error <= 0.02
+    assert result.worst in ("joint_3", "joint_6", "joint_8", "joint_10")
+    np.testing.assert_allclose(phi(robot)[[2, 7, 9]], [0.2, 0.2, -0.8], atol=0.03)
+    # What the motion capture saw, and what was true.
+    truth = np.array([state.w for state in robot.truth_after(begun)])
+    assert 0.0 < result.head_position_error < 0.01
+    assert np.linalg.norm(truth[:, :3] - w[:3], axis=1).max() < 0.01
+    assert np.abs(truth[:, 3:] - w[3:]).max() < 0.04
+    assert not any(state.fallen for state in robot.truth_after(begun))
+    feedback = robot.reshapes.feedback
+    assert feedback[0].phase == "moving"
+    assert feedback[-1].progress == 1.0
+    assert any("tracking" in f.controller or "scaled" in f.controller for f in feedback)
+    states = [
+        s
+        for s in robot.states.messages
+        if stamp_ns(s) > begun and s.status == ControllerState.STATUS_RESHAPING
+    ]
+    assert len(states) > 50
+    assert all(s.reasons[0] == ControllerState.REASON_JOINT_MOTION for s in states)
+    assert all(s.reference_scale == 0.0 for s in states)
+    assert np.isfinite([s.v_b1 for s in states]).all()
 
-    def __init__(self, rig: ControllerRig) -> None:
-        self.rig, self.share, self._seen = rig, 1.0, 0
-        rig.head = rig.reference = None
-        rig.phi[:] = 0.0
+
+@pytest.mark.parametrize(
+    ("goal", "words"),
+    [
+        (
+            {"name": ["joint_8", "joint_7", "joint_1"], "angle": [0.0] * 3},
+            "no SCP: joint_7, joint_1; the SCPs are joint_3, joint_6, joint_8, joint_10",
+        ),
+        ({"name": ["joint_12"], "angle": [0.0]}, "joint_12 is no joint"),
+        ({"name": ["joint_8"], "angle": [2.6]}, "joint_8 = 2.6 rad: allowed: -2.5"),
+        ({}, "it names no joint"),
+    ],
+)
+def test_what_is_no_scp_is_told_with_those_that_are(robot, goal, words):
+    status, result = robot.reshapes.do(**goal)
+    assert (status, result.code) == (ABORTED, Reshape.Result.INVALID)
+    assert words in result.text
+
+
+def test_a_body_about_to_curl_into_itself_ends_a_reshape_and_a_cancellation_does(robot):
+    bring_to(robot, "start")
+    sent = robot.reshapes.send(name=["joint_8"], angle=[-2.3], speed=1.0)
+    status, result = robot.postures.do(posture="flat")
+    assert (status, result.code) == (ABORTED, Posture.NOT_AT_REST)
+    assert result.text == "reshape is under way: cancel it first"
+    status, result = sent.result()
+    assert (status, result.code) == (ABORTED, Reshape.Result.STOPPED)
+    assert result.text.startswith("the robot itself (two links would be")
+    assert -1.95 < phi(robot)[7] < -1.7
+
+    robot.reshapes.feedback.clear()
+    bring_to(robot, "start")
+    sent = robot.reshapes.send(name=["joint_10"], angle=[0.5], speed=0.3)
+    robot.graph.wait_for(
+        lambda: any(f.progress > 0.2 for f in robot.reshapes.feedback), 20.0, "motion"
+    )
+    sent.cancel()
+    status, result = sent.result()
+    assert (status, result.code) == (CANCELED, Reshape.Result.CANCELED)
+    np.testing.assert_array_equal(robot.commands.last.velocity, 0.0)
+    assert phi(robot)[9] < 0.4
+
+
+class Perfect:
+    """A robot that does each command for a cycle, as messages of a rig.
+
+    Attributes:
+        share: how much of it each joint does.
+        state: of the plant.
+    """
+
+    def __init__(self, rig: ControllerRig, phi: np.ndarray) -> None:
+        self.rig, self.share, self._seen = rig, np.ones(len(phi)), 0
+        self._plant = KinematicPlant(PAPER.robot, 0.01)
+        self.state = self._plant.reset(phi)
+        rig.head, self.head = None, rig.head
+        rig.reference = None
+        self._show(rig.joint_states)
         rig.graph.every(0.02, self._move)
 
     def _move(self) -> None:
-        rig = self.rig
-        if rig.joint_states is None:
+        rig, shown = self.rig, self.rig.joint_states
+        if shown is None:
             return
         for command in rig.commands.messages[self._seen :]:
-            rig.phi += 0.02 * self.share * np.array(command.velocity)
             self._seen += 1
-        rig.joint_states.position = [9.0, *rig.phi[::-1].tolist()]
+            self.state = self._plant.step(self.share * np.array(command.velocity), 0.02)
+        self._show(shown)
+
+    def _show(self, joint_states) -> None:
+        joint_states.position = [9.0, *self.state.phi[::-1].tolist()]
+        self.head.pose.pose = pose_message(self.state.w)
 
 
 def test_it_needs_joint_states_alone_and_stops_without_them():
     with Graph() as graph:
         rig = ControllerRig(graph)
-        joints = Joints(rig)
+        robot = Perfect(rig, FLAT)
         rig.joint_states, kept = None, rig.joint_states
-        graph.start(NODE, params_files=[CONFIG / "paper_robot.yaml"])
+        own = {"postures.bent_2": [0.1], "posture_patience_s": 1.0}
+        graph.start(NODE, params_files=[CONFIG / "paper_robot.yaml"], params=own)
         goals = Goals(graph, topics.GO_TO_POSTURE)
         status, result = goals.do(posture="start")
         assert (status, result.code) == (ABORTED, Posture.NO_INPUT)
@@ -278,7 +397,8 @@ def test_it_needs_joint_states_alone_and_stops_without_them():
         rig.joint_states = kept
         status, result = goals.do(posture="start", speed=1.0)
         assert (status, result.code) == (SUCCEEDED, Posture.NONE), result.text
-        np.testing.assert_allclose(rig.phi, START, atol=0.03)
+        np.testing.assert_allclose(robot.state.phi, START, atol=0.03)
+        assert not robot.state.fallen
 
         goals.feedback.clear()
         sent = goals.send(posture="flat", speed=0.5)
@@ -296,7 +416,7 @@ def test_it_needs_joint_states_alone_and_stops_without_them():
         # A short silence only interrupts a move.
         rig.joint_states = kept
         goals.feedback.clear()
-        sent = goals.send(posture="flat", speed=0.5)
+        sent = goals.send(posture="bent_2", speed=0.5)
         graph.wait_for(lambda: any(f.progress > 0.2 for f in goals.feedback), 20.0, "motion")
         rig.joint_states = None
         rig.wait_status(ControllerState.STATUS_STALE, what="the silence")
@@ -304,16 +424,42 @@ def test_it_needs_joint_states_alone_and_stops_without_them():
         status, result = sent.result()
         assert (status, result.code) == (SUCCEEDED, Posture.NONE), result.text
 
+        np.testing.assert_allclose(robot.state.phi, 0.1, atol=0.03)
+
+        # What holds the head needs to know where it is.
+        status, result = Goals(graph, topics.RESHAPE).do(name=["joint_8"], angle=[0.3])
+        assert (status, result.code) == (ABORTED, Reshape.Result.NO_INPUT)
+        assert result.text == "waiting for head/odometry"
+
+        rig.head = robot.head
+        goals.do(posture="start", speed=1.0)
+        w = robot.state.w
+        status, result = Goals(graph, topics.RESHAPE).do(name=["joint_8"], angle=[0.2], speed=0.3)
+        assert (status, result.code) == (SUCCEEDED, Reshape.Result.NONE), result.text
+        assert robot.state.phi[7] == pytest.approx(0.2, abs=0.02)
+        # Not in lockstep: what is measured is some cycles old, how many the machine decides.
+        assert 0.0 < result.head_position_error < 6e-3
+        assert 0.0 < result.head_rotation_error < 0.015
+        np.testing.assert_allclose(robot.state.w[:3], w[:3], atol=6e-3)
+        np.testing.assert_allclose(robot.state.w[3:], w[3:], atol=0.015)
+        robot.share[7] = 0.0
+        status, result = Goals(graph, topics.RESHAPE).do(name=["joint_8"], angle=[0.6], speed=0.3)
+        assert (status, result.code) == (ABORTED, Reshape.Result.STOPPED)
+        assert result.text.startswith("joint_8 is 0.")
+        assert "and does not come nearer; the controller: " in result.text
+        robot.share[7] = 1.0
+        rig.head = None
+
         # A joint that is stuck: the others wait for it, and it is named.
         rig.joint_states = kept
-        joints.share = np.where(np.arange(11) == 6, 0.0, 1.0)
-        status, result = goals.do(posture="start", speed=0.5)
+        robot.share[6] = 0.0
+        status, result = goals.do(posture="flat", speed=0.5)
         assert (status, result.code) == (ABORTED, Posture.STOPPED)
         assert result.text.startswith("joint_7 is 0.")
         assert result.text.endswith("and does not come nearer")
 
         # Nor does an angle that means nothing end the node.
-        joints.share = np.where(np.arange(11) == 6, 1e300, 1.0)
+        robot.share[6] = 1e300
         status, result = goals.do(posture="flat", speed=0.5)
         assert (status, result.code) == (ABORTED, Posture.STOPPED)
         assert "this posture has no answer: q[12] = " in result.text

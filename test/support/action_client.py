@@ -23,6 +23,7 @@ class Goals:
         self._client = ActionClient(graph.node, action.type, action.name)
         graph.wait_for(self._client.server_is_ready, 30.0, f"the action {action.name}")
         self.feedback: list[Any] = []
+        self._last: Sent | None = None
 
     def send(self, **goal: Any) -> Sent:
         """Send a goal, which has to be accepted."""
@@ -32,7 +33,14 @@ class Goals:
         self._graph.wait_for(sent.done, 20.0, "acceptance")
         handle = sent.result()
         assert handle.accepted
-        return Sent(self._graph, handle)
+        self._last = Sent(self._graph, handle)
+        return self._last
+
+    def cancel_last(self) -> None:
+        """Cancel the goal that was sent last, unless it is over; wait for its end."""
+        if self._last is not None and not self._last.over:
+            self._last.cancel()
+            self._last.result()
 
     def do(self, timeout_s: float = 60.0, **goal: Any) -> tuple[int, Any]:
         """Send a goal and wait for its status and result."""
