@@ -170,6 +170,8 @@ def _robot(bench: _Bench, directory: Path) -> dict[str, list[float]]:
         found["to_controller"].append(to_controller)
         found["to_bus"].append(whole - waiting - to_controller)
         found["step"].append(step.step_time)
+    if not found["rest"]:
+        raise RuntimeError(f"the robot did not follow: {bench.text}")
     return found
 
 

@@ -105,6 +105,7 @@ class Supervisor:
         self._sub_task_speeds = SUB_TASK_SHARE * np.array(robot.joint_speed_limits_rad_s)
         self._still = [0.0] * len(robot.controlled)
         self._no_scps = np.zeros(len(robot.scp_joints))
+        self._prepared: tuple[Array, BarriersAt] | None = None
         self.rest()
 
     def rest(self) -> None:
@@ -124,6 +125,24 @@ class Supervisor:
         self._u = before._u
         self._reference_scale = before._reference_scale
         self._begins = False
+
+    def prepare(self, phi: Array) -> None:
+        """Work out what depends on the joints alone, for whoever has time before the step.
+
+        Args:
+            phi: joint angles, (n-1,) [rad]; a step with others works it out itself.
+
+        Raises:
+            ModelError: phi is not finite.
+        """
+        if self._config.enabled:
+            self._prepared = (phi, self._barriers.at(phi))
+
+    def _limits_at(self, phi: Array) -> BarriersAt:
+        prepared, self._prepared = self._prepared, None
+        if prepared is not None and np.array_equal(prepared[0], phi):
+            return prepared[1]
+        return self._barriers.at(phi)
 
     def step(
         self, q: ArrayLike, q_dot: ArrayLike | None, reference: Reference, t: float
@@ -147,7 +166,7 @@ class Supervisor:
             return SupervisedResult(**{f.name: getattr(plain, f.name) for f in _PLAIN})
         posture, error = self._law.look(q, reference)
         phi = posture.g.q[6:]
-        at = self._barriers.at(phi)
+        at = self._limits_at(phi)
         self._lift(at)
         # Whoever gives the velocities of the SCPs has decided what they are used for.
         given_scps = reference.phi_tilde_dot_d

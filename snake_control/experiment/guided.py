@@ -113,6 +113,21 @@ class GuidedRobot:
                 scale = sample.result.reference_scale
             own += self._dt * scale
 
+    def turn(self, u: Array) -> PlantState:
+        """Move the joints for one cycle, whatever the head does; return the ground truth then.
+
+        Args:
+            u: joint velocities, (n-1,) [rad/s].
+        """
+        self._supervisor.rest()
+        self.state = self._plant.step(self._servos.command(u, self.state.phi, self._dt), self._dt)
+        self.t += self._dt
+        return self.state
+
+    def measured(self) -> Array:
+        """Return the joint angles that a controller would read, (n-1,) [rad]."""
+        return self._servos.measure(self.state.phi)
+
     def pause(self) -> None:
         """Have no reference for a moment: the next one is a new start."""
         self._supervisor.rest()

@@ -7,6 +7,7 @@ Stamps are judged by ROS time; timers run on a steady clock, also under ``use_si
 
 from __future__ import annotations
 
+import contextlib
 import time
 from typing import Any
 
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
 from rclpy.node import Node
+from sensor_msgs.msg import JointState
 from snake_interfaces.msg import BusState, ControllerState
 from std_srvs.srv import SetBool
 
@@ -95,7 +97,7 @@ class ScpControllerNode(Node):
         self._joint_states = Input(
             topics.JOINT_STATES.name,
             own.joint_states_timeout_s,
-            lambda message: joint_motion(message, self._robot.joint_names),
+            self._joint_motion,
         )
         self._head = Input(
             topics.HEAD_ODOMETRY.name,
@@ -133,6 +135,13 @@ class ScpControllerNode(Node):
         )
         self.create_timer(1.0 / own.rate_hz, self._on_timer, clock=self._steady)
         self.create_timer(_MARKERS_PERIOD_S, self._publish_markers, clock=self._steady)
+
+    def _joint_motion(self, message: JointState) -> tuple[Array, Array]:
+        phi, phi_dot = joint_motion(message, self._robot.joint_names)
+        # Now there is time; at the tick it would delay the command. The step says what fails.
+        with contextlib.suppress(*NO_ANSWER):
+            self._controller.prepare(phi)
+        return phi, phi_dot
 
     def _hear_bus(self, message: BusState) -> None:
         self._bus = (self._steady.now().nanoseconds, message)

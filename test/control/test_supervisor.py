@@ -246,3 +246,14 @@ def test_thresholds_that_contradict_each_other_are_refused(
 ) -> None:
     with pytest.raises(ValueError, match=f"^{field}"):
         SupervisorConfig(**given)
+
+
+def test_what_was_prepared_changes_nothing_and_is_not_used_for_other_angles() -> None:
+    robot, prepared = GuidedRobot(load_case((), 3)), GuidedRobot(load_case((), 3))
+    reference = Reference(robot.state.w + np.array([0.02, 0, 0, 0, 0, 0.1]), np.zeros(6))
+    for i in range(40):
+        phi = prepared.state.phi
+        prepared._supervisor.prepare(phi if i % 3 else phi + 0.2)
+        a, b = robot.cycle(reference), prepared.cycle(reference)
+        np.testing.assert_array_equal(a.result.u, b.result.u)
+        assert a.result.bound == b.result.bound

@@ -22,6 +22,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snake_control.config import Config
+from snake_control.control.joint_motion import Phase
+from snake_control.control.posture_motion import PostureMotion
+from snake_control.control.posture_way import PostureWays
 from snake_control.experiment.cases import load_case
 from snake_control.experiment.guided import GuidedRobot, GuidedSample, limited
 from snake_control.experiment.rehearsal import rehearse
@@ -56,6 +59,7 @@ class Outcome:
         range_rad, speed_rad_s: how far joints were beyond their ranges and speed limits, at most.
         d_min_m: the smallest.
         reasons: limits that slowed it or that the robot had to get away from.
+        command: what had to be called before a feasible reference was tracked again, if anything.
     """
 
     name: str
@@ -71,6 +75,7 @@ class Outcome:
     speed_rad_s: float
     d_min_m: float
     reasons: tuple[str, ...]
+    command: str = ""
 
 
 @functools.cache
@@ -129,7 +134,36 @@ def try_hostile(number: int, servos: str = "perfect") -> Outcome:
     robot = _robot(servos)
     one = hostile(robot.state.w, number + 1)[number]
     seen = list(robot.insist(one.reference, one.duration))
-    # Back to the usual height and attitude, from where the head is by now.
+    after, tracked_after = _back_to_the_usual(robot)
+    seen += after
+    command = ""
+    if tracked_after > WITHIN_S:
+        command = "go_to_posture start"
+        _go_to_start(robot)
+        after, tracked_after = _back_to_the_usual(robot)
+        seen += after
+    position, rotation = _error(after[-1])
+    return _outcome(
+        one.name,
+        servos,
+        robot,
+        seen,
+        accepted=True,
+        refusal="",
+        completed=tracked_after <= WITHIN_S and math.isfinite(position),
+        took=tracked_after,
+        error_m=position,
+        error_rad=rotation,
+        command=command,
+    )
+
+
+def _back_to_the_usual(robot: GuidedRobot) -> tuple[list[GuidedSample], float]:
+    """Go to the usual height and attitude from where the head is.
+
+    Returns:
+        What was seen, and after how long the head was on its reference for good [s].
+    """
     w = robot.state.w
     goal = np.array([*w[:2], *START[2:5], w[5]])
     # The reference is stopped before another one is started.
@@ -138,20 +172,24 @@ def try_hostile(number: int, servos: str = "perfect") -> Outcome:
     after = list(robot.follow(Approach(Hold(goal), w, 0.0, 8.0).sample, 8.0, 30.0))
     off = [s.t - begin for s in after if _error(s)[0] > TRACKED_M]
     dt = 1.0 / config().scp_controller.rate_hz
-    tracked_after = off[-1] + dt if off else 0.0
-    position, rotation = _error(after[-1])
-    return _outcome(
-        one.name,
-        servos,
-        robot,
-        seen + after,
-        accepted=True,
-        refusal="",
-        completed=tracked_after <= WITHIN_S and math.isfinite(position),
-        took=tracked_after,
-        error_m=position,
-        error_rad=rotation,
-    )
+    return after, off[-1] + dt if off else 0.0
+
+
+def _go_to_start(robot: GuidedRobot) -> None:
+    """Do what the action ``go_to_posture`` does with the posture ``start``."""
+    c = config()
+    ways = PostureWays(c.robot, c.supervisor)
+    found = ways.find(robot.measured(), c.postures.angles("posture", "start"))
+    assert found.corners, found.text
+    own = c.scp_controller
+    motion = PostureMotion(c.robot, own, c.supervisor, found, own.posture_speed_rad_s, robot.t)
+    deadline = robot.t + motion.duration + 5.0
+    phase = Phase.MOVING
+    while not phase.over and robot.t < deadline:
+        step = motion.step(robot.measured(), robot.t)
+        phase = step.motion.phase
+        assert not robot.turn(step.u).fallen
+    assert phase is Phase.ARRIVED
 
 
 def _error(sample: GuidedSample) -> tuple[float, float]:
@@ -201,7 +239,8 @@ def table(title: str, outcomes: Sequence[Outcome], took: str) -> str:
             result = f"refused ({o.refusal})"
         lines.append(
             f"| {o.name} | {o.servos} | {result} | {o.took:.2f} | {1e3 * o.error_m:.2f} | "
-            f"{o.error_rad:.4f} | {1e3 * o.d_min_m:.1f} | {', '.join(o.reasons)} |"
+            f"{o.error_rad:.4f} | {1e3 * o.d_min_m:.1f} | {', '.join(o.reasons)}"
+            f"{' (' + o.command + ')' if o.command else ''} |"
         )
     return "\n".join(lines) + "\n"
 
@@ -218,6 +257,7 @@ def summary(feasible: Sequence[Outcome], hostile: Sequence[Outcome]) -> dict[str
         "median_error_rad": float(np.median([o.error_rad for o in accepted] or [math.nan])),
         "hostile": len(hostile),
         "tracked_again": sum(o.completed for o in hostile),
+        "of_these_after_a_command": sum(o.completed and bool(o.command) for o in hostile),
         "fell": sum(o.fell for o in every),
         "beyond_range_rad": max((o.range_rad for o in every), default=math.nan),
         "beyond_speed_rad_s": max((o.speed_rad_s for o in every), default=math.nan),

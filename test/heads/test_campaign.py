@@ -21,12 +21,13 @@ def test_what_the_robot_can_do_is_accepted_and_done(number: int) -> None:
 
 
 LEFT_WITH_A_SINGULAR_HEAD = 92
+HELPED_BY_A_POSTURE = 68
 
 
 @pytest.mark.parametrize(
     "number",
-    [*range(len(HOSTILE_KINDS)), LEFT_WITH_A_SINGULAR_HEAD],
-    ids=[*HOSTILE_KINDS, "left_with_a_singular_head"],
+    [*range(len(HOSTILE_KINDS)), LEFT_WITH_A_SINGULAR_HEAD, HELPED_BY_A_POSTURE],
+    ids=[*HOSTILE_KINDS, "left_with_a_singular_head", "helped_by_a_posture"],
 )
 def test_what_it_must_not_do_is_ridden_out(number: int) -> None:
     outcome = try_hostile(number)
@@ -35,6 +36,7 @@ def test_what_it_must_not_do_is_ridden_out(number: int) -> None:
     assert outcome.range_rad <= 0.0
     assert outcome.speed_rad_s <= 1e-9
     assert outcome.completed, f"tracked again after {outcome.took:.1f} s"
+    assert bool(outcome.command) == (number == HELPED_BY_A_POSTURE)
 
 
 def test_the_limited_servos_ride_it_out_too() -> None:
