@@ -49,7 +49,7 @@ _NODE_GROUPS: dict[str, type] = {
 }
 _SHARED_GROUPS_OF_NODE: dict[str, tuple[str, ...]] = {
     "bus_driver": ("robot", "servos", GROUP),
-    "pose_input": (),
+    "pose_input": ("robot",),
     "scp_controller": ("robot", "controller", "supervisor", GROUP),
     "trajectory_generator": ("robot", "controller", "supervisor"),
     "keyboard_teleop": (),

@@ -69,6 +69,16 @@ class PoseInputConfig:
     timeout_s: float = parameter(
         0.1, "without a pose this fresh the head pose is not valid [s]", low=0.01, high=10.0
     )
+    bridge_s: float = parameter(
+        0.3,
+        "for so long since the last good pose the joints say where the head is, where no poses "
+        "come; 0: never [s]",
+        low=0.0,
+        high=1.0,
+    )
+    watch: bool = parameter(
+        True, "compare the poses with the joints, and say what seems to be wrong (docs/pose.md)"
+    )
     position_noise_m: float = parameter(
         0.0005,
         "standard deviation of a measured position, per axis, where the source gives none; the "

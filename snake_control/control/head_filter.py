@@ -158,6 +158,15 @@ class HeadFilter:
         """Forget everything, for a clock that was set back."""
         self._estimate = None
 
+    def go_on_from(self, estimate: HeadEstimate) -> None:
+        """Put an estimate from elsewhere in the place of its own, such as one of a prediction.
+
+        The next pose is filtered from there; errors of its pose and of its rate are taken for
+        independent.
+        """
+        self._estimate = estimate
+        self._cross = np.zeros((6, 6))
+
     def update(
         self,
         stamp_ns: int,

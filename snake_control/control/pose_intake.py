@@ -1,7 +1,7 @@
 """All that becomes of a measured pose until it is an estimate of the head, or is refused.
 
 In this order: frame, time of capture, numbers, whether the body was seen, repeats, the way from the
-markers to the head, jumps, the filter.
+markers to the head, jumps, the filter. After a gap that was bridged the filter goes on from there.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from snake_control.control.head_filter import (
     Rejection,
     unusable,
 )
+from snake_control.control.pose_bridge import PoseBridge
 from snake_control.control.pose_clock import ClockWatch
 from snake_control.control.pose_freeze import FreezeWatch
 from snake_control.control.pose_gate import JumpGate, JumpLimits, NewPlace
@@ -51,6 +52,21 @@ class Measurement:
     covariance: Array | None = None
 
 
+@dataclasses.dataclass(frozen=True)
+class HeadPose:
+    """A measured pose of the head, before the filter.
+
+    Attributes:
+        stamp_ns: time of capture [ns].
+        position: of the tip in the world, (3,) [m].
+        quaternion: attitude of the head in the world, [x, y, z, w].
+    """
+
+    stamp_ns: int
+    position: Array
+    quaternion: Array
+
+
 class PoseIntake:
     """Judges poses one after the other, and counts.
 
@@ -60,16 +76,26 @@ class PoseIntake:
         pauses, longest_pause_s: times without good poses that were longer than the time-out.
         new_places: how often the head was found at another place.
         news: what happened at the last pose beside its result; empty if nothing did.
+        set_back: whether the clock was found set back at the last pose.
+        measured: the newest good pose as it was measured, ``None`` before the first.
     """
 
-    def __init__(self, config: PoseInputConfig, future_tolerance_s: float) -> None:
+    def __init__(
+        self,
+        config: PoseInputConfig,
+        future_tolerance_s: float,
+        bridge: PoseBridge | None = None,
+    ) -> None:
         """Set everything up, without a pose.
 
         Args:
             config: what is believed, and where the markers are.
             future_tolerance_s: how far ahead of this computer's clock a stamp may be.
+            bridge: what bridges gaps; it is told what is refused, but what is taken only by
+                ``PoseBridge.took``, once the estimate has gone on its way.
         """
         self._config = config
+        self._bridge = bridge
         self._future_tolerance_ns = round(future_tolerance_s * 1e9)
         self._frames = {"", config.frame_id, *config.pose_frames}
         self._filter = HeadFilter(
@@ -100,6 +126,8 @@ class PoseIntake:
         self.longest_pause_s = 0.0
         self.refused: collections.Counter[Reason] = collections.Counter()
         self.news = ""
+        self.set_back = False
+        self.measured: HeadPose | None = None
 
     @property
     def estimate(self) -> HeadEstimate | None:
@@ -122,11 +150,15 @@ class PoseIntake:
             The estimate at its time of capture, or why it was refused (the estimate then stays).
         """
         self.news = ""
+        self.set_back = False
         before = self.estimate
         if before is not None and before.stamp_ns > now_ns + self._future_tolerance_ns:
             self.news = "the clock was set back: the filter starts anew"
+            self.set_back = True
             self._filter.reset()
             self.clock.reset()
+            if self._bridge is not None:
+                self._bridge.reset()
             before = None
         result = self._judge(measurement, now_ns)
         if isinstance(result, Rejection):
@@ -142,6 +174,8 @@ class PoseIntake:
     def refuse(self, rejection: Rejection) -> Rejection:
         """Count a pose that was refused, also one that did not even come (a body not seen)."""
         self.refused[rejection.reason] += 1
+        if self._bridge is not None:
+            self._bridge.refused(rejection.reason)
         return rejection
 
     def _judge(self, measurement: Measurement, now_ns: int) -> HeadEstimate | Rejection:
@@ -189,7 +223,18 @@ class PoseIntake:
             self.new_places += 1
             self.news = str(judged)
             self._filter.reset()
-        return self._filter.update(stamp_ns, position, rotation.as_quat(), covariance)
+        elif self._bridge is not None and self._in_order(stamp_ns):
+            bridged = self._bridge.before(stamp_ns)
+            if bridged is not None:
+                self._filter.go_on_from(bridged)
+        xyzw = rotation.as_quat()
+        result = self._filter.update(stamp_ns, position, xyzw, covariance)
+        if isinstance(result, HeadEstimate):
+            self.measured = HeadPose(stamp_ns, position, xyzw)
+        return result
+
+    def _in_order(self, stamp_ns: int) -> bool:
+        return self.estimate is None or stamp_ns > self.estimate.stamp_ns
 
     def _repeats(self, stamp_ns: int, position: Array, xyzw: Array) -> Rejection | None:
         after_s = self._config.frozen_after_s

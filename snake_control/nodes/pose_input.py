@@ -6,20 +6,33 @@ Stamps are judged by ROS time; timers run on a steady clock, also under ``use_si
 from __future__ import annotations
 
 import collections
+import dataclasses
 from typing import Any
 
+import numpy as np
 from rclpy.clock import Clock, ClockType
 from rclpy.event_handler import QoSRequestedIncompatibleQoSInfo, SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import qos_policy_name_from_kind
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.subscription import Subscription
+from sensor_msgs.msg import JointState
 from snake_interfaces.msg import PoseStatus
 
 from snake_control.control.head_filter import HeadEstimate, Rejection
+from snake_control.control.head_prediction import Prediction
+from snake_control.control.pose_bridge import PoseBridge
+from snake_control.control.pose_hypotheses import Cause
 from snake_control.control.pose_intake import Measurement, PoseIntake
+from snake_control.control.pose_watch import PoseWatch
+from snake_control.errors import ModelError
 from snake_control.nodes import topics
-from snake_control.nodes.conversions import odometry_message
+from snake_control.nodes.conversions import (
+    MessageError,
+    joint_motion,
+    odometry_message,
+    stamp_ns,
+)
 from snake_control.nodes.inputs import FUTURE_TOLERANCE_S
 from snake_control.nodes.parameters import NodeParameters
 from snake_control.nodes.pose_messages import (
@@ -42,7 +55,10 @@ _NEWS_NS = 2_000_000_000
 
 
 class PoseInput(Node):
-    """Filters measured poses; one that is refused leads to no odometry, only to a status."""
+    """Filters measured poses; one that is refused leads to no odometry, only to a status.
+
+    Short gaps are bridged by the joints, and the poses are compared with them.
+    """
 
     def __init__(self, **overrides: Any) -> None:
         """Subscribe to what the configuration names.
@@ -51,11 +67,22 @@ class PoseInput(Node):
             ConfigError: a parameter that is not allowed, or messages that are not installed.
         """
         super().__init__("pose_input", **overrides)
-        self._config = NodeParameters(self, "pose_input").config.pose_input
+        config = NodeParameters(self, "pose_input").config
+        self._config = config.pose_input
+        self._joint_names = config.robot.joint_names
         self._timeout_ns = round(self._config.timeout_s * 1e9)
         self._diagnostics_ns = round(self._config.diagnostics_period_s * 1e9)
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._intake = PoseIntake(self._config, FUTURE_TOLERANCE_S)
+        self._bridge = (
+            PoseBridge(config.robot, self._config, FUTURE_TOLERANCE_S)
+            if self._config.bridge_s > 0.0
+            else None
+        )
+        self._watch = PoseWatch(config.robot) if self._config.watch else None
+        self._suspicion: tuple[Cause, tuple[int, ...]] = (Cause.NOTHING, ())
+        self._joints_problem = ""
+        self._odometry_ns = 0
+        self._intake = PoseIntake(self._config, FUTURE_TOLERANCE_S, self._bridge)
         self._fault: Rejection | None = None
         self._fault_ns = 0
         self._age_on_arrival_s = 0.0
@@ -76,6 +103,10 @@ class PoseInput(Node):
         self._subscription = self._subscribe(first)
         for feed in others:
             self._subscribe(feed)
+        if self._bridge is not None or self._watch is not None:
+            # All of them count, not only the newest.
+            t = topics.JOINT_STATES
+            self.create_subscription(t.type, t.name, self._receive_joints, t.qos)
         self.create_timer(_STATUS_PERIOD_S, self._report, clock=self._steady)
         self.create_timer(_LOOK_PERIOD_S, self._look, clock=self._steady)
 
@@ -101,12 +132,17 @@ class PoseInput(Node):
             if self._intake.news:
                 self._news, self._news_ns = self._intake.news, self._steady_ns()
                 self.get_logger().warning(self._news)
+            if self._intake.set_back:
+                self._odometry_ns = 0
+                if self._watch is not None:
+                    self._watch.reset()
         else:
             result = self._intake.refuse(measured)
         if isinstance(result, HeadEstimate):
             self._fault = None
             self._age_on_arrival_s = (now - result.stamp_ns) * 1e-9
             self._publish_odometry(result)
+            self._take_note(result, now)
         elif result.reason.is_fault:
             self._fault, self._fault_ns = result, self._steady_ns()
         verdict = self._judge(now)
@@ -114,24 +150,86 @@ class PoseInput(Node):
             self._publish_status(verdict, now)
 
     def _publish_odometry(self, estimate: HeadEstimate) -> None:
-        """Send what is believed of the head: every accepted pose ends here, and nothing else."""
+        """Send what is believed of the head: every accepted pose ends here, and every prediction.
+
+        After a gap, poses that are older than what was predicted already only serve the filter.
+        """
+        if estimate.stamp_ns <= self._odometry_ns:
+            return
+        self._odometry_ns = estimate.stamp_ns
         self._odometry.publish(
             odometry_message(estimate, self._config.frame_id, self._config.child_frame_id)
         )
+
+    def _take_note(self, estimate: HeadEstimate, now: int) -> None:
+        """Let those know of a good pose whom nobody waits for."""
+        if self._bridge is not None:
+            self._bridge.took(estimate, now)
+        if self._watch is not None and self._intake.measured is not None:
+            pose = self._intake.measured
+            try:
+                self._watch.pose(pose.stamp_ns, pose.position, pose.quaternion)
+            except (ModelError, np.linalg.LinAlgError) as error:
+                self._watch_anew(error)
+
+    def _receive_joints(self, message: JointState) -> None:
+        now = self.get_clock().now().nanoseconds
+        try:
+            phi, phi_dot = joint_motion(message, self._joint_names)
+        except MessageError as error:
+            self._joints_problem = f"{topics.JOINT_STATES.name}: {error}"
+            return
+        self._joints_problem = ""
+        stamp = stamp_ns(message)
+        if self._bridge is not None:
+            prediction = self._bridge.joints(stamp, phi, phi_dot, now)
+            if prediction is not None:
+                self._publish_odometry(prediction.estimate)
+                verdict = self._judge(now)
+                if self._published is None or verdict.status != self._published.status:
+                    self._publish_status(verdict, now)
+        if self._watch is not None:
+            try:
+                self._watch.joints(stamp, phi)
+            except (ModelError, np.linalg.LinAlgError) as error:
+                self._watch_anew(error)
+
+    def _watch_anew(self, error: Exception) -> None:
+        """Begin to compare anew: it must not keep the poses from going on."""
+        assert self._watch is not None
+        self._watch.reset()
+        self.get_logger().warning(f"poses and joints are compared anew: {error}")
 
     def _steady_ns(self) -> int:
         return self._steady.now().nanoseconds
 
     def _judge(self, now: int) -> Verdict:
         """Return how far the head pose can be trusted at time ``now`` [ns]."""
+        prediction = self._prediction(now)
+        verdict = dataclasses.replace(self._judge_poses(now, prediction), prediction=prediction)
+        if self._watch is None:
+            return verdict
+        seen = self._watch.verdict
+        return dataclasses.replace(verdict, cause=seen.cause, suspicion=seen.text)
+
+    def _prediction(self, now: int) -> Prediction | None:
+        """Return the prediction that is in force, ``None`` if none is."""
+        prediction = None if self._bridge is None else self._bridge.prediction
+        if prediction is None or now - prediction.estimate.stamp_ns > self._timeout_ns:
+            return None
+        return prediction
+
+    def _judge_poses(self, now: int, prediction: Prediction | None) -> Verdict:
         estimate, steady_ns = self._intake.estimate, self._steady_ns()
-        remarks = [self._intake.clock.problem, self._senders.problem]
+        remarks = [self._intake.clock.problem, self._senders.problem, self._joints_problem]
         if self._news and steady_ns - self._news_ns < _NEWS_NS:
             remarks.append(self._news)
+        bridged = "" if prediction is None else self._bridged(prediction)
         remark = "; ".join(filter(None, remarks))
         fault = self._fault
         if fault and (steady_ns - self._fault_ns <= self._timeout_ns or estimate is None):
             reason = NUMBER_OF_REASON[fault.reason]
+            remark = "; ".join(filter(None, [bridged, remark]))
             return Verdict(PoseStatus.STATUS_INVALID, reason, fault.text, remark)
         none = PoseStatus.REASON_NONE
         if estimate is None:
@@ -139,6 +237,8 @@ class PoseInput(Node):
             if not (self._senders.fitting or self._senders.problem):
                 text += ": nobody publishes it"
             return Verdict(PoseStatus.STATUS_WAITING, none, text, remark)
+        if bridged:
+            return Verdict(PoseStatus.STATUS_PREDICTED, none, bridged, remark)
         age = (now - estimate.stamp_ns) * 1e-9
         if age <= self._config.timeout_s:
             return Verdict(PoseStatus.STATUS_VALID, none, "valid", remark)
@@ -150,10 +250,31 @@ class PoseInput(Node):
             )
         return Verdict(PoseStatus.STATUS_STALE, none, text, remark)
 
+    def _bridged(self, prediction: Prediction) -> str:
+        return (
+            f"no pose for {prediction.age_s:.2f} s: the joints say where the head is, within "
+            f"{1e3 * prediction.position_std_m:.1f} mm and "
+            f"{1e3 * prediction.attitude_std_rad:.1f} mrad (for {self._config.bridge_s:g} s at most)"
+        )
+
     def _report(self) -> None:
         """Publish the status, and diagnostics when they are due or something has changed."""
         now = self.get_clock().now().nanoseconds
         self._publish_status(self._judge(now), now)
+        self._tell_suspicion()
+
+    def _tell_suspicion(self) -> None:
+        """Log what seems to be wrong with poses and joints, when that changes."""
+        if self._watch is None:
+            return
+        seen = self._watch.verdict
+        before, self._suspicion = self._suspicion, (seen.cause, seen.joints)
+        if self._suspicion == before:
+            return
+        if seen.cause is Cause.NOTHING:
+            self.get_logger().info(f"pose against joints: {seen.text}")
+        else:
+            self.get_logger().warning(f"pose against joints: {seen.text}")
 
     def _publish_status(self, verdict: Verdict, now: int) -> None:
         before, self._published = self._published, verdict
@@ -170,6 +291,7 @@ class PoseInput(Node):
             self._config.frame_id,
             self._rate(),
             self._senders.fitting,
+            0 if self._bridge is None else self._bridge.gaps,
         )
         self._status.publish(status)
         self._diagnose(status, verdict)
@@ -179,7 +301,8 @@ class PoseInput(Node):
         last = self._diagnosed
         changed = (
             last is None
-            or (verdict.status, verdict.reason) != (last.status, last.reason)
+            or (verdict.status, verdict.reason, verdict.cause)
+            != (last.status, last.reason, last.cause)
             or bool(verdict.remarks) != bool(last.remarks)
         )
         if not changed and steady_ns - self._diagnosed_ns < self._diagnostics_ns:

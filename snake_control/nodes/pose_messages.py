@@ -9,6 +9,8 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from snake_interfaces.msg import PoseStatus
 
 from snake_control.control.head_filter import Reason
+from snake_control.control.head_prediction import Prediction
+from snake_control.control.pose_hypotheses import Cause
 from snake_control.control.pose_intake import PoseIntake
 from snake_control.nodes.conversions import diagnostic_status, header
 
@@ -30,12 +32,21 @@ _STATUS_NAMES = {
     PoseStatus.STATUS_VALID: "VALID",
     PoseStatus.STATUS_STALE: "STALE",
     PoseStatus.STATUS_INVALID: "INVALID",
+    PoseStatus.STATUS_PREDICTED: "PREDICTED",
 }
 _LEVELS = {
     PoseStatus.STATUS_WAITING: DiagnosticStatus.WARN,
     PoseStatus.STATUS_VALID: DiagnosticStatus.OK,
     PoseStatus.STATUS_STALE: DiagnosticStatus.ERROR,
     PoseStatus.STATUS_INVALID: DiagnosticStatus.ERROR,
+    PoseStatus.STATUS_PREDICTED: DiagnosticStatus.WARN,
+}
+_NUMBER_OF_CAUSE = {
+    Cause.NOTHING: PoseStatus.SUSPICION_NONE,
+    Cause.WRONG_DIRECTION: PoseStatus.SUSPICION_WRONG_DIRECTION,
+    Cause.SWAPPED_JOINTS: PoseStatus.SUSPICION_SWAPPED_JOINTS,
+    Cause.WRONG_MARKER_OFFSET: PoseStatus.SUSPICION_WRONG_MARKER_OFFSET,
+    Cause.WHEEL_SLIP: PoseStatus.SUSPICION_WHEEL_SLIP,
 }
 
 
@@ -47,12 +58,18 @@ class Verdict:
         status, reason: numbers of PoseStatus.
         text: both in words.
         remarks: what else is amiss; empty if nothing is.
+        prediction: in force at that time, ``None`` if there is none.
+        cause: what seems to be wrong when poses and joints are compared.
+        suspicion: the same in words.
     """
 
     status: int
     reason: int
     text: str
     remarks: str = ""
+    prediction: Prediction | None = None
+    cause: Cause = Cause.NOTHING
+    suspicion: str = "poses and joints are not compared"
 
     @property
     def words(self) -> str:
@@ -61,11 +78,18 @@ class Verdict:
 
 
 def status_message(
-    verdict: Verdict, intake: PoseIntake, now_ns: int, frame_id: str, rate: float, publishers: int
+    verdict: Verdict,
+    intake: PoseIntake,
+    now_ns: int,
+    frame_id: str,
+    rate: float,
+    publishers: int,
+    gaps_bridged: int,
 ) -> PoseStatus:
     """Return the status at ``now_ns``."""
     estimate = intake.estimate
     refused = [intake.refused[reason] for reason in NUMBER_OF_REASON]
+    predicted = verdict.prediction
     return PoseStatus(
         header=header(now_ns, frame_id),
         status=verdict.status,
@@ -85,15 +109,23 @@ def status_message(
         clock_offset=intake.clock.offset_s,
         clock_drift=intake.clock.drift_s,
         publishers=publishers,
+        predicted_for=predicted.age_s if predicted else 0.0,
+        predicted_position_std=predicted.position_std_m if predicted else 0.0,
+        predicted_attitude_std=predicted.attitude_std_rad if predicted else 0.0,
+        gaps_bridged=gaps_bridged,
+        suspicion=_NUMBER_OF_CAUSE[verdict.cause],
+        suspicion_text=verdict.suspicion,
     )
 
 
 def diagnostics(
     status: PoseStatus, verdict: Verdict, intake: PoseIntake, topic: str
 ) -> DiagnosticArray:
-    """Return a status as diagnostics; a warning where only the remarks say something."""
-    level = _LEVELS[verdict.status]
-    if verdict.remarks:
+    """Return a status as diagnostics; a warning where only remarks or suspicion say something."""
+    level, words = _LEVELS[verdict.status], verdict.words
+    if verdict.cause is not Cause.NOTHING:
+        words = f"{words}; {verdict.suspicion}"
+    if verdict.remarks or verdict.cause is not Cause.NOTHING:
         level = max(level, DiagnosticStatus.WARN)
     counts = {f"refused: {reason.value}": str(intake.refused[reason]) for reason in Reason}
     return DiagnosticArray(
@@ -103,7 +135,7 @@ def diagnostics(
                 "pose_input: head pose",
                 topic,
                 level[0],
-                verdict.words,
+                words,
                 {
                     "status": _STATUS_NAMES[verdict.status],
                     "age [s]": f"{status.age:.3f}",
@@ -117,6 +149,8 @@ def diagnostics(
                     "pauses": str(status.pauses),
                     "longest pause [s]": f"{status.longest_pause:.2f}",
                     "new places": str(status.new_places),
+                    "gaps bridged": str(status.gaps_bridged),
+                    "pose against joints": verdict.suspicion,
                 },
             )
         ],
