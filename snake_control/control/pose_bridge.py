@@ -139,7 +139,8 @@ class PoseBridge:
         return last if last.stamp_ns < stamp_ns else None
 
     def _missing(self, now_ns: int) -> bool:
-        if self._measured is None or self._contradicted:
+        # After the first pose alone nobody knows when the next one is due.
+        if self._measured is None or self._contradicted or not self._interval_ns:
             return False
         if self.prediction is not None:
             return True

@@ -252,9 +252,10 @@ class PoseInput(Node):
 
     def _bridged(self, prediction: Prediction) -> str:
         return (
-            f"no pose for {prediction.age_s:.2f} s: the joints say where the head is, within "
+            f"no pose for {prediction.age_s:.2f} s (bridged for {self._config.bridge_s:g} s at "
+            "most): the joints say where the head is, within "
             f"{1e3 * prediction.position_std_m:.1f} mm and "
-            f"{1e3 * prediction.attitude_std_rad:.1f} mrad (for {self._config.bridge_s:g} s at most)"
+            f"{1e3 * prediction.attitude_std_rad:.1f} mrad"
         )
 
     def _report(self) -> None:

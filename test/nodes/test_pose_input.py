@@ -1,12 +1,14 @@
 """The pose input node on real DDS: odometry of good poses, a status of bad ones."""
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import PoseStamped
 from rclpy.qos import QoSProfile, ReliabilityPolicy
+from sensor_msgs.msg import JointState
 from snake_interfaces.msg import PoseStatus
 
 from snake_control.model.rotation import quaternion_from_rpy
@@ -14,6 +16,8 @@ from snake_control.nodes import topics
 from snake_control.nodes.conversions import array, head_motion, header, point, quaternion, stamp_ns
 from support.clock import SettableClock
 from support.graph import CONFIG, Graph
+from support.moving_head import STEP_S, MovingHead
+from support.robots import PAPER
 
 MS = 1_000_000
 RPY = np.array([0.1, -0.8, 2.5])
@@ -245,3 +249,140 @@ def test_poses_go_on_when_the_clock_is_set_back_and_stands():
         clock.freeze()
         count = len(mocap.status.messages)
         graph.wait_for(lambda: len(mocap.status.messages) > count + 10, 10.0, "statuses")
+
+
+class Robot:
+    """Poses and joint states of a moving head, at the times of their stamps.
+
+    Attributes:
+        gap: times between which no pose is sent [s].
+        truth: where the head was, by stamp.
+    """
+
+    def __init__(self, mocap, fastest_rad_s=0.1, flipped=()):
+        self._mocap, self._graph = mocap, mocap.graph
+        self._head = MovingHead(PAPER, fastest_rad_s)
+        self._signs = np.ones(PAPER.joints)
+        self._signs[[joint - 1 for joint in flipped]] = -1.0
+        self._rng = np.random.default_rng(8)
+        self._steps = 0
+        self.gap = (math.inf, math.inf)
+        self.truth = {}
+        self.begin_ns = self._graph.now_ns()
+        self._joints = self._graph.publisher(topics.JOINT_STATES, wait=True)
+        self._graph.every(STEP_S, self._go_on)
+
+    @property
+    def t(self):
+        return self._head.t
+
+    def stamp(self, t):
+        return self.begin_ns + round(t * 1e9)
+
+    def _go_on(self):
+        while self.stamp(self._head.t) <= self._graph.now_ns():
+            stamp = self.stamp(self._head.t)
+            self.truth[stamp] = self._head.position
+            if not self.gap[0] <= self._head.t < self.gap[1]:
+                place = self._head.position + self._rng.normal(0.0, 2e-4, 3)
+                self._mocap.send(stamp, place, self._head.quaternion)
+            if self._steps % 2 == 0:
+                self._joints.publish(
+                    JointState(
+                        header=header(stamp),
+                        name=list(PAPER.joint_names),
+                        position=(self._signs * self._head.phi).tolist(),
+                        velocity=(self._signs * self._head.phi_dot).tolist(),
+                    )
+                )
+            self._head.step()
+            self._steps += 1
+
+    def leave_out(self, seconds):
+        """Send valid poses for a while, then none; return what was heard from there on."""
+        mocap = self._mocap
+        mocap.wait_status(PoseStatus.STATUS_VALID)
+        since = self.t
+        self._graph.wait_for(lambda: self.t > since + 0.5, 20.0, "poses before the gap")
+        mocap.status.clear()
+        begin = self.t + 0.05
+        self.gap = (begin, begin + seconds)
+
+        def over():
+            last = mocap.odometry.last
+            status = mocap.status.last
+            return (
+                stamp_ns(last) > self.stamp(begin + seconds + 0.3)
+                and status.status == PoseStatus.STATUS_VALID
+            )
+
+        self._graph.wait_for(over, 20.0, "poses after the gap")
+        edges = self.stamp(begin), self.stamp(begin + seconds)
+        inside = [m for m in mocap.odometry.messages if edges[0] <= stamp_ns(m) < edges[1]]
+        return inside, mocap.status.messages
+
+
+def test_a_short_gap_is_bridged_by_the_joints_and_a_long_one_is_not():
+    with Graph() as graph:
+        mocap = Mocap(graph)
+        robot = Robot(mocap)
+        heard = []
+
+        def bridged():
+            """A stall of the machine may have taken the joint states, too."""
+            heard[:] = robot.leave_out(0.2)
+            return len(heard[0]) >= 4
+
+        graph.wait_for(bridged, 60.0, "a gap that was bridged")
+        inside, statuses = heard
+        variances = np.array([np.diag(np.reshape(m.pose.covariance, (6, 6))) for m in inside])
+        assert (np.diff(variances, axis=0) > 0).all()
+        assert variances[0, 0] > 0.0005**2
+        for message in inside:
+            there = robot.truth[stamp_ns(message)]
+            assert np.linalg.norm(array(message.pose.pose.position) - there) < 5e-3
+        predicted = [s for s in statuses if s.status == PoseStatus.STATUS_PREDICTED]
+        assert predicted
+        assert "the joints say where the head is, within" in predicted[0].text
+        assert 0.04 < predicted[0].predicted_for <= 0.3
+        assert predicted[0].predicted_position_std > 0.0005
+        assert statuses[-1].predicted_for == 0.0
+        assert statuses[-1].gaps_bridged > 0
+
+        inside, statuses = robot.leave_out(0.8)
+        ages = [stamp_ns(m) * 1e-9 - robot.stamp(robot.gap[0]) * 1e-9 for m in inside]
+        assert max(ages, default=0.0) <= 0.3
+        stale = [s for s in statuses if s.status == PoseStatus.STATUS_STALE]
+        assert stale
+        assert "s old (limit 0.1 s)" in stale[0].text
+
+        stamps = [stamp_ns(message) for message in mocap.odometry.messages]
+        assert all(a < b for a, b in pairwise(stamps))
+        assert mocap.status.last.suspicion == PoseStatus.SUSPICION_NONE
+
+
+def test_a_joint_that_turns_the_wrong_way_is_named_and_stops_nothing():
+    with Graph() as graph:
+        diagnostics = graph.subscribe(topics.DIAGNOSTICS)
+        mocap = Mocap(graph, max_speed_m_s=10.0)
+        Robot(mocap, fastest_rad_s=0.4, flipped=(8,))
+
+        def named():
+            last = mocap.status.last
+            return last if last and last.suspicion != PoseStatus.SUSPICION_NONE else None
+
+        status = graph.wait_for(named, 40.0, "a suspicion")
+        assert status.suspicion == PoseStatus.SUSPICION_WRONG_DIRECTION
+        assert "joint 8 seems to turn the wrong way" in status.suspicion_text
+        graph.wait_for(lambda: "pose against joints: joint 8" in graph.report(), 10.0, "the log")
+        graph.wait_for(
+            lambda: any(
+                each.level == DiagnosticStatus.WARN and "joint 8" in each.message
+                for message in diagnostics.messages
+                for each in message.status
+            ),
+            10.0,
+            "diagnostics",
+        )
+        stamp = stamp_ns(mocap.odometry.last)
+        graph.wait_for(lambda: stamp_ns(mocap.odometry.last) > stamp, 10.0, "odometry that goes on")

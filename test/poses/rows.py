@@ -32,7 +32,19 @@ class Row:
 
 
 ROWS = (
-    Row("dropout 0.1 s", PoseFault("pose_dropout", 0.1), None),
+    Row(
+        "dropout 0.1 s",
+        PoseFault("pose_dropout", 0.1),
+        False,
+        says="the joints say where the head is",
+        short=True,
+    ),
+    Row(
+        "dropout 0.2 s",
+        PoseFault("pose_dropout", 0.2),
+        False,
+        says="the joints say where the head is",
+    ),
     Row("dropout 0.5 s", PoseFault("pose_dropout", 0.5), True, True, "s old", short=True),
     Row("dropout 2 s", PoseFault("pose_dropout", 2.0), True, True, "s old"),
     Row("one outlier of 0.2 m", PoseFault("pose_jump", 0.01, 0.2), False),
