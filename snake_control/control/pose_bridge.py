@@ -1,8 +1,8 @@
 """Decides when a gap of motion capture is bridged by the joints, and how poses are taken up again.
 
-A gap begins when poses are missing for longer than usual and the newest one has used half of its
-time-out, so that nobody who waits for that long has to stop. It ends with the next good pose, or
-where the predictor ends it. Poses that are refused because they speak against their source (a
+A gap begins when poses are missing for longer than usual and joint states are newer than the last
+pose by a good part of its time-out, so that nobody who waits for that long has to stop. It ends
+with the next good pose, or where the predictor ends it. Poses that are refused because they speak against their source (a
 jump, another frame, no numbers) are not bridged: then nobody knows where the head is.
 """
 
@@ -16,8 +16,8 @@ from snake_control.config import PoseInputConfig, RobotConfig
 from snake_control.control.head_filter import HeadEstimate, Reason
 from snake_control.control.head_prediction import HeadPredictor, Prediction, PredictionLimits
 
-_USED = 0.5
-"""Share of the time-out that the newest pose has used when a gap begins."""
+_BEHIND = 0.3
+"""A pose that is older than a joint state by more than this share of its time-out is missed."""
 _LATE_INTERVALS = 1.2
 _LEAST_SILENCE = 0.25
 """Poses are missing after so many usual intervals, and this share of the time-out."""
@@ -89,7 +89,7 @@ class PoseBridge:
             return None
         self._predictor.joints(stamp_ns, phi, phi_dot)
         newest = self._measured if self.prediction is None else self.prediction.estimate
-        if newest is None or stamp_ns <= newest.stamp_ns or not self._missing(now_ns):
+        if newest is None or stamp_ns <= newest.stamp_ns or not self._missing(stamp_ns, now_ns):
             return None
         answer = self._predictor.predict(stamp_ns)
         if not isinstance(answer, Prediction):
@@ -138,7 +138,8 @@ class PoseBridge:
         last = self.prediction.estimate
         return last if last.stamp_ns < stamp_ns else None
 
-    def _missing(self, now_ns: int) -> bool:
+    def _missing(self, stamp_ns: int, now_ns: int) -> bool:
+        """Whether a pose is missed at a joint state of ``stamp_ns`` that comes at ``now_ns``."""
         # After the first pose alone nobody knows when the next one is due.
         if self._measured is None or self._contradicted or not self._interval_ns:
             return False
@@ -146,7 +147,7 @@ class PoseBridge:
             return True
         silence_ns = max(_LATE_INTERVALS * self._interval_ns, _LEAST_SILENCE * self._timeout_ns)
         return (
-            now_ns - self._measured.stamp_ns > _USED * self._timeout_ns
+            stamp_ns - self._measured.stamp_ns > _BEHIND * self._timeout_ns
             and now_ns - self._arrived_ns > silence_ns
         )
 
