@@ -1,9 +1,10 @@
 """Decides when a gap of motion capture is bridged by the joints, and how poses are taken up again.
 
-A gap begins when poses are missing for longer than usual and joint states are newer than the last
-pose by a good part of its time-out, so that nobody who waits for that long has to stop. It ends
-with the next good pose, or where the predictor ends it. Poses that are refused because they speak against their source (a
-jump, another frame, no numbers) are not bridged: then nobody knows where the head is.
+A gap begins when poses are missing for longer than usual, and joint states are newer than the last
+one by a good part of its time-out, so that nobody who waits for that long has to stop. It ends with
+the next good pose, or where the predictor ends it. Poses that are refused because they speak
+against their source (a jump, another frame, no numbers) are not bridged: then nobody knows where
+the head is.
 """
 
 from __future__ import annotations

@@ -245,3 +245,31 @@ def test_a_jump_of_half_a_turn_is_finite_and_forgotten(angle):
         assert isinstance(estimate, HeadEstimate)
         assert np.isfinite(estimate.angular_velocity).all()
     assert (estimate.rotation * target.inv()).magnitude() < 1e-6
+
+
+def test_it_goes_on_from_an_estimate_of_somebody_else():
+    filter_, last = moving_filter()
+    given = HeadEstimate(
+        last + 5 * STEP_NS,
+        np.array([1.0, 2.0, 3.0]),
+        Rotation.identity(),
+        np.array([0.1, 0.0, 0.0]),
+        np.array([0.0, 0.0, 0.2]),
+        np.eye(6) * 1e-4,
+        np.eye(6) * 1e-2,
+    )
+    filter_.go_on_from(given)
+    assert filter_.estimate is given
+    dt = STEP_NS * 1e-9
+    turned = Rotation.from_rotvec(given.angular_velocity * dt)
+    noise = np.eye(6) * 1e-6
+    estimate = filter_.update(
+        given.stamp_ns + STEP_NS, given.position + given.velocity * dt, turned.as_quat(), noise
+    )
+    # A pose just where it was expected changes neither pose nor twist.
+    np.testing.assert_allclose(estimate.position, [1.001, 2.0, 3.0], atol=1e-12)
+    np.testing.assert_allclose(estimate.velocity, given.velocity, atol=1e-12)
+    np.testing.assert_allclose(estimate.angular_velocity, given.angular_velocity, atol=1e-9)
+    g, _ = gains(CUTOFF_HZ, dt)
+    expected = (1 - g) ** 2 * (1e-4 + dt**2 * 1e-2) + g**2 * 1e-6
+    np.testing.assert_allclose(estimate.pose_covariance, expected * np.eye(6), atol=1e-15)

@@ -294,7 +294,7 @@ def test_the_filter_goes_on_from_a_prediction_without_a_jump() -> None:
         if k == 500 + BRIDGE:
             before = made.predict(ns(samples[k - 1].t))
             assert isinstance(before, Prediction)
-            filter_._estimate = before.estimate
+            filter_.go_on_from(before.estimate)
         noise = rng.normal(0.0, 0.0005, 3)
         estimate = filter_.update(there.stamp_ns, there.position + noise, there.rotation.as_quat())
         assert isinstance(estimate, HeadEstimate)

@@ -226,7 +226,8 @@ class Rig:
         if any(np.any(c.velocity) for c in commands if stamp_ns(c) == rest_ns):
             found.violations.append("a command to move although the controller says it stopped")
         if row.stops is False:
-            found.violations.append("the robot was stopped")
+            texts = {s.text: None for s in states if _stopped_by_pose(s)}
+            found.violations.append(f"the robot was stopped: {'; '.join(texts)}")
         stamps = [stamp_ns(m) for m in self._odometry.messages]
         believed_ns = max((s for s in stamps if s <= rest_ns), default=rest_ns)
         found.stop_s = (rest_ns - believed_ns) * 1e-9

@@ -37,7 +37,6 @@ ROWS = (
         PoseFault("pose_dropout", 0.1),
         False,
         says="the joints say where the head is",
-        short=True,
     ),
     Row(
         "dropout 0.2 s",
