@@ -132,7 +132,8 @@ class PoseInput(Node):
             if self._intake.news:
                 self._news, self._news_ns = self._intake.news, self._steady_ns()
                 self.get_logger().warning(self._news)
-            if self._intake.set_back:
+            # By the clock alone, too: odometry must not wait until an old time comes again.
+            if self._intake.set_back or self._odometry_ns - now > 1e9 * FUTURE_TOLERANCE_S:
                 self._odometry_ns = 0
                 if self._watch is not None:
                     self._watch.reset()
