@@ -9,7 +9,6 @@ import collections
 import dataclasses
 from typing import Any
 
-import numpy as np
 from rclpy.clock import Clock, ClockType
 from rclpy.event_handler import QoSRequestedIncompatibleQoSInfo, SubscriptionEventCallbacks
 from rclpy.node import Node
@@ -52,6 +51,9 @@ _LATE = 0.5
 """A pose that was older on arrival, as a share of its time-out, is late by itself."""
 _NEWS_NS = 2_000_000_000
 """How long the status tells what happened."""
+
+# What joint angles beyond all reason lead to, and a covariance that is none.
+_NO_ANSWER = (ModelError, ArithmeticError, ValueError)
 
 
 class PoseInput(Node):
@@ -170,7 +172,7 @@ class PoseInput(Node):
             pose = self._intake.measured
             try:
                 self._watch.pose(pose.stamp_ns, pose.position, pose.quaternion)
-            except (ModelError, np.linalg.LinAlgError) as error:
+            except _NO_ANSWER as error:
                 self._watch_anew(error)
 
     def _receive_joints(self, message: JointState) -> None:
@@ -192,14 +194,16 @@ class PoseInput(Node):
         if self._watch is not None:
             try:
                 self._watch.joints(stamp, phi)
-            except (ModelError, np.linalg.LinAlgError) as error:
+            except _NO_ANSWER as error:
                 self._watch_anew(error)
 
     def _watch_anew(self, error: Exception) -> None:
         """Begin to compare anew: it must not keep the poses from going on."""
         assert self._watch is not None
         self._watch.reset()
-        self.get_logger().warning(f"poses and joints are compared anew: {error}")
+        self.get_logger().warning(
+            f"poses and joints are compared anew: {error}", throttle_duration_sec=1.0
+        )
 
     def _steady_ns(self) -> int:
         return self._steady.now().nanoseconds

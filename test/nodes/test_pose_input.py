@@ -256,6 +256,7 @@ class Robot:
 
     Attributes:
         gap: times between which no pose is sent [s].
+        scale: what angles are multiplied by before they are sent.
         truth: where the head was, by stamp.
     """
 
@@ -267,6 +268,7 @@ class Robot:
         self._rng = np.random.default_rng(8)
         self._steps = 0
         self.gap = (math.inf, math.inf)
+        self.scale = 1.0
         self.truth = {}
         self.begin_ns = self._graph.now_ns()
         self._joints = self._graph.publisher(topics.JOINT_STATES, wait=True)
@@ -291,7 +293,7 @@ class Robot:
                     JointState(
                         header=header(stamp),
                         name=list(PAPER.joint_names),
-                        position=(self._signs * self._head.phi).tolist(),
+                        position=(self.scale * self._signs * self._head.phi).tolist(),
                         velocity=(self._signs * self._head.phi_dot).tolist(),
                     )
                 )
@@ -365,7 +367,7 @@ def test_a_joint_that_turns_the_wrong_way_is_named_and_stops_nothing():
     with Graph() as graph:
         diagnostics = graph.subscribe(topics.DIAGNOSTICS)
         mocap = Mocap(graph, max_speed_m_s=10.0)
-        Robot(mocap, fastest_rad_s=0.4, flipped=(8,))
+        robot = Robot(mocap, fastest_rad_s=0.4, flipped=(8,))
 
         def named():
             last = mocap.status.last
@@ -384,5 +386,7 @@ def test_a_joint_that_turns_the_wrong_way_is_named_and_stops_nothing():
             10.0,
             "diagnostics",
         )
+        robot.scale = 1e200
+        graph.wait_for(lambda: "compared anew" in graph.report(), 20.0, "angles beyond all reason")
         stamp = stamp_ns(mocap.odometry.last)
         graph.wait_for(lambda: stamp_ns(mocap.odometry.last) > stamp, 10.0, "odometry that goes on")
