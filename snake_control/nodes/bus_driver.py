@@ -37,12 +37,11 @@ from snake_control.nodes.bus_messages import (
     checked_velocities,
     diagnostics,
     no_diagnostics,
-    of_robot,
     time_message,
 )
 from snake_control.nodes.bus_requests import NotLoweredError
 from snake_control.nodes.bus_snapshot import Snapshot, State
-from snake_control.nodes.conversions import stamp_ns
+from snake_control.nodes.conversions import of_robot, stamp_ns
 from snake_control.nodes.managed import ManagedNode, logged
 from snake_control.nodes.parameters import NodeParameters
 from snake_control.nodes.process import THREAD_SWITCH_S, run

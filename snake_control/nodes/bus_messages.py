@@ -198,16 +198,6 @@ def diagnostics(snapshot: Snapshot, health: Health, port: str, stamp: Time) -> D
     return array
 
 
-def of_robot(array: DiagnosticArray, namespace: str) -> DiagnosticArray:
-    """Put a robot's namespace before names and hardware ids: all robots share /diagnostics."""
-    robot = namespace.strip("/")
-    if robot:
-        for status in array.status:
-            status.name = f"{robot}/{status.name}"
-            status.hardware_id = f"{robot}: {status.hardware_id}"
-    return array
-
-
 def _torque(reading: JointReading) -> str:
     if reading.shut_down:
         return "held back after an alarm"

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 from builtin_interfaces.msg import Time
-from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import Point, Pose, Quaternion, TwistStamped, Vector3
 from nav_msgs.msg import Odometry
 from numpy.typing import NDArray
@@ -162,6 +162,16 @@ def diagnostic_status(
         hardware_id=hardware,
         values=[KeyValue(key=key, value=value) for key, value in values.items()],
     )
+
+
+def of_robot(array: DiagnosticArray, namespace: str) -> DiagnosticArray:
+    """Put a robot's namespace before names and hardware ids: all robots share /diagnostics."""
+    robot = namespace.strip("/")
+    if robot:
+        for status in array.status:
+            status.name = f"{robot}/{status.name}"
+            status.hardware_id = f"{robot}: {status.hardware_id}"
+    return array
 
 
 def odometry_message(estimate: HeadEstimate, frame_id: str, child_frame_id: str) -> Odometry:

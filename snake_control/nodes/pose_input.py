@@ -30,6 +30,7 @@ from snake_control.nodes.conversions import (
     MessageError,
     joint_motion,
     odometry_message,
+    of_robot,
     stamp_ns,
 )
 from snake_control.nodes.inputs import FUTURE_TOLERANCE_S
@@ -314,9 +315,8 @@ class PoseInput(Node):
         if not changed and steady_ns - self._diagnosed_ns < self._diagnostics_ns:
             return
         self._diagnosed, self._diagnosed_ns = verdict, steady_ns
-        self._diagnostics.publish(
-            diagnostics(status, verdict, self._intake, self._subscription.topic_name)
-        )
+        array = diagnostics(status, verdict, self._intake, self._subscription.topic_name)
+        self._diagnostics.publish(of_robot(array, self.get_namespace()))
 
     def _look(self) -> None:
         """See who publishes, and what is wrong with the clocks; tell it once."""

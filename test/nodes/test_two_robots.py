@@ -132,7 +132,8 @@ def test_only_the_robot_that_is_told_moves_and_each_tells_of_itself(tmp_path):
             np.testing.assert_allclose(found[5:], STARTS[robot.name][5:], atol=0.02)
         told = {status.name: status for m in diagnostics.messages for status in m.status}
         parts = ("bus", *(f"joint_{joint}" for joint in range(1, len(START) + 1)))
-        assert set(told) == {f"{name}/bus_driver: {part}" for name in ROBOTS for part in parts}
+        whose = [f"bus_driver: {part}" for part in parts] + ["pose_input: head pose"]
+        assert set(told) == {f"{name}/{what}" for name in ROBOTS for what in whose}
         for name in ROBOTS:
             assert told[f"{name}/bus_driver: joint_3"].hardware_id == f"{name}: AX-12 id 3"
             port = f"{name}: {tmp_path / name}"
