@@ -43,6 +43,7 @@ ROWS = (
         PoseFault("pose_dropout", 0.2),
         False,
         says="the joints say where the head is",
+        short=True,
     ),
     Row("dropout 0.5 s", PoseFault("pose_dropout", 0.5), True, True, "s old", short=True),
     Row("dropout 2 s", PoseFault("pose_dropout", 2.0), True, True, "s old"),
