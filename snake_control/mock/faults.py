@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Protocol
 
 import numpy as np
@@ -30,6 +30,32 @@ class FaultError(SnakeError, ValueError):
         super().__init__(f"{field} = {value!r}: {allowed}")
 
 
+def checked(
+    kinds: Mapping[str, Kind],
+    name: str,
+    duration_s: float,
+    value: float | None,
+    probability: float,
+) -> Kind:
+    """Return the kind of a fault.
+
+    Raises:
+        FaultError: there is none of that name, or what was given does not fit it.
+    """
+    kind = kinds.get(name)
+    if kind is None:
+        raise FaultError("fault", name, f"known are {', '.join(kinds)}")
+    if not (math.isfinite(duration_s) and duration_s >= 0.0):
+        raise FaultError("duration", duration_s, "give 0 (until cleared) or more")
+    if not 0.0 < probability <= 1.0:
+        raise FaultError("probability", probability, "give more than 0, at most 1")
+    if value is not None and not kind.value:
+        raise FaultError("value", value, f"{name} has no strength: give none")
+    if value is not None and not kind.low <= value <= kind.high:
+        raise FaultError("value", value, f"{kind.value}: {kind.low:g} to {kind.high:g}")
+    return kind
+
+
 @dataclasses.dataclass(frozen=True)
 class Fault:
     """One fault to come.
@@ -49,23 +75,11 @@ class Fault:
     probability: float = 1.0
 
     def __post_init__(self) -> None:
-        kind = KINDS.get(self.kind)
-        if kind is None:
-            raise FaultError("fault", self.kind, f"known are {', '.join(KINDS)}")
+        kind = checked(KINDS, self.kind, self.duration_s, self.value, self.probability)
         if kind.concerns is Concerns.LINE and self.ids:
             raise FaultError("ids", list(self.ids), f"{self.kind} concerns the line: give none")
-        if not (math.isfinite(self.duration_s) and self.duration_s >= 0.0):
-            raise FaultError("duration", self.duration_s, "give 0 (until cleared) or more")
-        if not 0.0 < self.probability <= 1.0:
-            raise FaultError("probability", self.probability, "give more than 0, at most 1")
         if self.probability != 1.0 and kind.concerns is not Concerns.REPLIES:
             raise FaultError("probability", self.probability, f"{self.kind} has none: give 1")
-        if self.value is None:
-            return
-        if not kind.value:
-            raise FaultError("value", self.value, f"{self.kind} has no strength: give none")
-        if not kind.low <= self.value <= kind.high:
-            raise FaultError("value", self.value, f"{kind.value}: {kind.low:g} to {kind.high:g}")
 
     @property
     def about(self) -> Kind:

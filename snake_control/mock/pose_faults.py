@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snake_control.mock.fault_kinds import Concerns, Kind
-from snake_control.mock.faults import FaultError
+from snake_control.mock.faults import checked
 
 Array = NDArray[np.float64]
 
@@ -52,19 +52,7 @@ class PoseFault:
     probability: float = 1.0
 
     def __post_init__(self) -> None:
-        kind = POSE_KINDS.get(self.kind)
-        if kind is None:
-            raise FaultError("fault", self.kind, f"known are {', '.join(POSE_KINDS)}")
-        if not (math.isfinite(self.duration_s) and self.duration_s >= 0.0):
-            raise FaultError("duration", self.duration_s, "give 0 (until cleared) or more")
-        if not 0.0 < self.probability <= 1.0:
-            raise FaultError("probability", self.probability, "give more than 0, at most 1")
-        if self.value is None:
-            return
-        if not kind.value:
-            raise FaultError("value", self.value, f"{self.kind} has no strength: give none")
-        if not kind.low <= self.value <= kind.high:
-            raise FaultError("value", self.value, f"{kind.value}: {kind.low:g} to {kind.high:g}")
+        checked(POSE_KINDS, self.kind, self.duration_s, self.value, self.probability)
 
     @property
     def strength(self) -> float:

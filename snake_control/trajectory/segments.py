@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import abc
 import dataclasses
 import math
 from collections.abc import Sequence
@@ -123,7 +124,7 @@ class Place:
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Segment:
+class Segment(abc.ABC):
     """One part of a trajectory.
 
     Attributes:
@@ -134,13 +135,13 @@ class Segment:
     kind: ClassVar[str]
     settings: Settings = NOTHING_SAID
 
+    @abc.abstractmethod
     def motion(self, place: Place) -> Motion:
         """Return the motion from ``place.here``, from rest to rest.
 
         Raises:
             TrajectoryError: a pose that cannot be.
         """
-        raise NotImplementedError
 
     def where(self, motion: Motion, t: float) -> str:
         """Return in which part of it ``motion`` is at its time ``t`` [s]; empty if it has none."""
