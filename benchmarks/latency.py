@@ -4,8 +4,11 @@ Three messages between four processes: this one sends the pose, ``pose_input`` t
 ``scp_controller`` the command, and ``bus_driver`` writes goals. The robot follows its line the
 while, the mock at the other end of the port. How long a message waited for a tick of the
 controller or the driver (and for the transaction that was on the bus) the nodes say themselves;
-all else is the rest. The relay has as many messages between as many processes, and runs alone,
-before and after.
+all else is the rest.
+
+The relay has as many messages between as many processes. It runs all the time: beside the robot,
+half an interval after the robot's poses, so that both meet the same machine at the same load; and
+alone before, which says what that load is worth.
 """
 
 from __future__ import annotations
@@ -18,8 +21,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -42,7 +44,9 @@ SETTLE_S = 4.0
 
 _ROOT = Path(__file__).parents[1]
 _START_S = 60.0
+_END_S = 5.0
 _RAW = "mocap/raw"
+_Times = dict[str, list[float]]
 _FOLLOWING = (ControllerState.STATUS_TRACKING, ControllerState.STATUS_LIMITED)
 
 
@@ -67,6 +71,9 @@ class _Bench(Node):
     def spin_for(self, seconds: float) -> None:
         self.spin(lambda: False, seconds)
 
+    def now(self) -> float:
+        return self.get_clock().now().nanoseconds * 1e-9
+
     def stamp(self, message: PoseStamped) -> PoseStamped:
         message.header.stamp = self.get_clock().now().to_msg()
         return message
@@ -85,42 +92,61 @@ def _ns(stamp) -> int:  # type: ignore[no-untyped-def]
     return int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)
 
 
-@contextmanager
-def _relays(directory: Path) -> Iterator[Path]:
-    times = directory / "relay.json"
-    ends = (["relay_0", "relay_1"], ["relay_1", "relay_2"], ["relay_2", "--times", str(times)])
-    processes = [
-        subprocess.Popen([sys.executable, "-m", "benchmarks.relay", *end], cwd=_ROOT)
-        for end in ends
-    ]
-    try:
-        yield times
-    finally:
-        for process in processes:
-            process.send_signal(signal.SIGINT)
-        for process in processes:
-            process.wait()
+class _Relay:
+    """Three processes that pass poses on; how long it took is known when they have ended."""
 
+    def __init__(self, bench: _Bench, directory: Path) -> None:
+        times = directory / "relay.json"
+        ends = (["relay_0", "relay_1"], ["relay_1", "relay_2"], ["relay_2", "--times", str(times)])
+        self._times = times
+        self._bench = bench
+        self._processes = [
+            subprocess.Popen([sys.executable, "-m", "benchmarks.relay", *end], cwd=_ROOT)
+            for end in ends
+        ]
+        t = topics.MOCAP_POSE
+        self._publisher = bench.create_publisher(t.type, "relay_0", t.qos)
 
-def _relay(bench: _Bench, directory: Path) -> list[float]:
-    """Return how long poses took through the relay [s]."""
-    t = topics.MOCAP_POSE
-    publisher = bench.create_publisher(t.type, "relay_0", t.qos)
-    with _relays(directory) as times:
-        if not bench.spin(publisher.get_subscription_count, _START_S):
+    def await_start(self) -> None:
+        if not self._bench.spin(self._publisher.get_subscription_count, _START_S):
             raise RuntimeError("the relay does not start")
-        timer = bench.create_timer(
-            1.0 / POSES_HZ, lambda: publisher.publish(bench.stamp(PoseStamped()))
-        )
-        bench.spin_for(SETTLE_S + RELAY_S)
-        bench.destroy_timer(timer)
-    bench.destroy_publisher(publisher)
-    found: list[float] = json.loads(times.read_text())
-    return found[-round(RELAY_S * POSES_HZ) :]
+
+    def send(self) -> None:
+        self._publisher.publish(self._bench.stamp(PoseStamped()))
+
+    def end(self) -> list[tuple[float, float]]:
+        """Return when each pose was sent, on the clock of stamps, and how long it took [s]."""
+        for process in self._processes:
+            process.send_signal(signal.SIGINT)
+        for process in self._processes:
+            try:
+                process.wait(_END_S)
+            except subprocess.TimeoutExpired:
+                # The middleware may hang while nodes disappear at the same time; the times were
+                # written before.
+                process.kill()
+                process.wait()
+        self._bench.destroy_publisher(self._publisher)
+        return [(sent, taken) for sent, taken in json.loads(self._times.read_text())]
 
 
-def _robot(bench: _Bench, directory: Path) -> dict[str, list[float]]:
-    """Return the times of all commands that followed a pose and reached the bus [s]."""
+def _relay_alone(bench: _Bench, relay: _Relay) -> tuple[float, float]:
+    """Send poses through the relay for a while; return when that began and ended."""
+    timer = bench.create_timer(1.0 / POSES_HZ, relay.send)
+    bench.spin_for(SETTLE_S)
+    begun = bench.now()
+    bench.spin_for(RELAY_S)
+    bench.destroy_timer(timer)
+    return begun, bench.now()
+
+
+def _robot(bench: _Bench, relay: _Relay, directory: Path) -> tuple[_Times, tuple[float, float]]:
+    """Let the robot follow its line, poses going through the relay, too.
+
+    Returns:
+        The times of all commands that followed a pose and reached the bus [s]; and when that began
+        and ended.
+    """
     processes = NodeProcesses(directory, os.environ | {"ROS_LOG_DIR": str(directory)})
     config = _ROOT / "config"
     files = ["--params-file", str(config / "paper_robot.yaml")]
@@ -135,7 +161,17 @@ def _robot(bench: _Bench, directory: Path) -> dict[str, list[float]]:
     }
     t = topics.MOCAP_POSE
     pose = bench.create_publisher(t.type, t.name, t.qos)
-    bench.create_subscription(t.type, _RAW, lambda m: pose.publish(bench.stamp(m)), t.qos)
+
+    def pass_on(message: PoseStamped) -> None:
+        pose.publish(bench.stamp(message))
+        between.reset()
+
+    def send_between() -> None:
+        between.cancel()
+        relay.send()
+
+    between = bench.create_timer(0.5 / POSES_HZ, send_between)
+    bench.create_subscription(t.type, _RAW, pass_on, t.qos)
     for t, heard in (
         (topics.CONTROLLER_STATE, bench.hear_step),
         (topics.BUS_STATE, bench.hear_cycle),
@@ -150,11 +186,13 @@ def _robot(bench: _Bench, directory: Path) -> dict[str, list[float]]:
             raise RuntimeError(f"the robot does not follow: {bench.text}")
         bench.spin_for(SETTLE_S)
         bench.steps.clear()
+        begun = bench.now()
         bench.spin_for(ROBOT_S)
+        ended = bench.now()
         processes.check()
     finally:
         processes.stop(reversed(own), 8.0)
-    found: dict[str, list[float]] = {
+    found: _Times = {
         name: [] for name in ("end_to_end", "waiting", "rest", "to_controller", "to_bus", "step")
     }
     for stamp, cycle in bench.cycles.items():
@@ -172,7 +210,7 @@ def _robot(bench: _Bench, directory: Path) -> dict[str, list[float]]:
         found["step"].append(step.step_time)
     if not found["rest"]:
         raise RuntimeError(f"the robot did not follow: {bench.text}")
-    return found
+    return found, (begun, ended)
 
 
 def _figures(name: str, times: list[float]) -> dict[str, float]:
@@ -183,19 +221,27 @@ def _figures(name: str, times: list[float]) -> dict[str, float]:
 
 
 def measure(_blocks: int, _calls: int) -> dict[str, dict[str, float]]:
-    """Measure relay, robot, relay, one after the other."""
+    """Measure the relay alone, then robot and relay beside each other."""
     with tempfile.TemporaryDirectory(prefix="bench_") as name, own_domain():
         directory = Path(name)
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
         bench = _Bench()
         try:
-            relay = _relay(bench, directory)
-            robot = _robot(bench, directory)
-            relay += _relay(bench, directory)
+            relay = _Relay(bench, directory)
+            try:
+                relay.await_start()
+                alone = _relay_alone(bench, relay)
+                robot, beside = _robot(bench, relay, directory)
+            finally:
+                poses = relay.end()
         finally:
             bench.destroy_node()
             rclpy.shutdown()
-    ratio = statistics.median(robot["rest"]) / statistics.median(relay)
+
+    def taken(span: tuple[float, float]) -> list[float]:
+        return [each for sent, each in poses if span[0] <= sent <= span[1]]
+
+    rest = statistics.median(robot["rest"])
     return {
         "robot": {
             "commands": float(len(robot["rest"])),
@@ -205,7 +251,12 @@ def measure(_blocks: int, _calls: int) -> dict[str, dict[str, float]]:
             **_figures("of_it_to_controller", robot["to_controller"]),
             **_figures("of_it_to_bus", robot["to_bus"]),
             **_figures("of_that_step", robot["step"]),
-            "rest_to_relay": ratio,
+            "rest_to_relay": rest / statistics.median(taken(beside)),
+            "rest_to_relay_alone": rest / statistics.median(taken(alone)),
         },
-        "relay": {"poses": float(len(relay)), **_figures("relay", relay)},
+        "relay": {
+            "poses": float(len(taken(beside))),
+            **_figures("beside", taken(beside)),
+            **_figures("alone", taken(alone)),
+        },
     }

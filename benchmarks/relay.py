@@ -1,6 +1,7 @@
 """One link of a bare rclpy relay: ``python -m benchmarks.relay IN OUT``, or ``IN --times FILE``.
 
-It passes poses on, as little as rclpy lets it; the last one writes how old they came, as JSON.
+It passes poses on, as little as rclpy lets it; the last one writes, as JSON, when each was stamped
+and how old it came [s].
 """
 
 from __future__ import annotations
@@ -33,13 +34,14 @@ def main() -> int:
     signal.signal(signal.SIGINT, on_signal)
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     node = rclpy.create_node(f"relay_of_{given.heard}")
-    ages: list[float] = []
+    ages: list[tuple[float, float]] = []
     if given.said is None:
         clock = node.get_clock()
 
         def take(message: PoseStamped) -> None:
             stamp = message.header.stamp
-            ages.append((clock.now().nanoseconds - stamp.sec * 10**9 - stamp.nanosec) * 1e-9)
+            stamp_ns = stamp.sec * 10**9 + stamp.nanosec
+            ages.append((stamp_ns * 1e-9, (clock.now().nanoseconds - stamp_ns) * 1e-9))
     else:
         take = node.create_publisher(PoseStamped, given.said, qos_profile_sensor_data).publish
     node.create_subscription(PoseStamped, given.heard, take, qos_profile_sensor_data)

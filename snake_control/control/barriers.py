@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 
 from snake_control.config import RobotConfig, SupervisorConfig
 from snake_control.control.limits import RANGE_MARGIN_RAD
-from snake_control.model.floor import head_pose_on_floor
-from snake_control.model.geometry import geometry
+from snake_control.model.floor import geometry_on_floor
+from snake_control.model.geometry import Geometry
 from snake_control.model.head_block import HeadBlock
 from snake_control.model.singular_shape import singular_shape
 from snake_control.model.stability import support
@@ -67,9 +67,21 @@ class Barriers:
         self.lower = bounds[:, 0] + RANGE_MARGIN_RAD
         self.upper = bounds[:, 1] - RANGE_MARGIN_RAD
 
-    def at(self, phi: Array) -> BarriersAt:
-        """Return the limits as they are seen from joint angles, (n-1,) [rad]."""
-        return BarriersAt(self, phi)
+    def at(self, phi: Array, on_floor: Geometry | None = None) -> BarriersAt:
+        """Return the limits as they are seen from joint angles, (n-1,) [rad].
+
+        Args:
+            phi: joint angles, (n-1,) [rad].
+            on_floor: their ``geometry_on_floor``, if that is known already.
+
+        Raises:
+            ModelError: phi is not finite.
+        """
+        return BarriersAt(self, phi, self._margins(on_floor or self.on_floor(phi)))
+
+    def on_floor(self, phi: Array) -> Geometry:
+        """Return ``geometry_on_floor`` of this robot."""
+        return geometry_on_floor(self._robot, phi)
 
     @property
     def widths(self) -> dict[Limit, float]:
@@ -100,9 +112,10 @@ class Barriers:
         d_min less its stop threshold [m]; its stop threshold less the nearness of a singular
         shape; and the regularity of the head block less its stop threshold.
         """
+        return self._margins(self.on_floor(phi))
+
+    def _margins(self, g: Geometry) -> dict[Limit, float]:
         c = self._config
-        w = head_pose_on_floor(self._robot, phi, np.zeros(3))
-        g = geometry(self._robot, np.concatenate((w, phi)))
         margins = {Limit.FALL: support(g).d_min - c.d_min_stop_m}
         if c.nearness_stop < 1.0:
             margins[Limit.SINGULAR_BODY] = c.nearness_stop - singular_shape(g).nearness
@@ -130,11 +143,11 @@ class BarriersAt:
         lifted: limits that do not count at present.
     """
 
-    def __init__(self, barriers: Barriers, phi: Array) -> None:
+    def __init__(self, barriers: Barriers, phi: Array, margins: dict[Limit, float]) -> None:
         self._barriers = barriers
         self._phi = phi
         self.lowest, self.highest, self._by_lower, self._by_upper = barriers.bounds(phi)
-        self.margins = barriers.margins(phi)
+        self.margins = margins
         self.lifted: frozenset[Limit] = frozenset()
 
     def largest_share(self, start: Array, way: Array) -> tuple[float, Bound | None]:

@@ -106,7 +106,7 @@ class HeadEstimate:
     def is_finite(self) -> bool:
         """Whether all of it are numbers."""
         parts = (self.position, self.rotation.as_quat(), self.velocity, self.angular_velocity)
-        return all(np.isfinite(part).all() for part in parts)
+        return bool(np.isfinite(np.concatenate(parts)).all())
 
 
 def gains(cutoff_hz: float, dt: float) -> tuple[float, float]:

@@ -44,6 +44,8 @@ class FreezeWatch:
         self._last: bytes | None = None
         self._last_ns = self._newest_ns = 0
         self._poses: collections.deque[tuple[int, Array]] = collections.deque(maxlen=4)
+        # Not looked at yet: no pose should wait for what is asked now and then.
+        self._pending: list[tuple[tuple[int, Array], ...]] = []
         self._lengths: collections.deque[float] = collections.deque(maxlen=_KEPT)
         self._reversed: collections.deque[bool] = collections.deque(maxlen=_KEPT)
         self._noisy = False
@@ -51,6 +53,7 @@ class FreezeWatch:
     @property
     def noise_m(self) -> float:
         """Standard deviation of the noise of the position, per axis [m]; NaN while unknown."""
+        self._catch_up()
         if len(self._lengths) < _ENOUGH:
             return math.nan
         return float(np.median(self._lengths)) / _LENGTH_PER_NOISE
@@ -68,18 +71,25 @@ class FreezeWatch:
         bits = values.tobytes()
         step_ns, self._newest_ns = stamp_ns - self._newest_ns, stamp_ns
         if bits == self._last:
+            self._catch_up()
             return (stamp_ns - self._last_ns) * 1e-9 if self._noisy else None
         self._last, self._last_ns = bits, stamp_ns
         if not 0 < step_ns <= self._longest_gap_ns:
             self._poses.clear()
         self._poses.append((stamp_ns, values[:3]))
-        self._look_for_noise()
+        if len(self._poses) == self._poses.maxlen:
+            self._pending.append(tuple(self._poses))
+        if len(self._pending) >= _KEPT:
+            self._catch_up()
         return None
 
-    def _look_for_noise(self) -> None:
-        if len(self._poses) < 4:
-            return
-        stamps, positions = zip(*self._poses, strict=True)
+    def _catch_up(self) -> None:
+        pending, self._pending = self._pending, []
+        for poses in pending:
+            self._look_for_noise(poses)
+
+    def _look_for_noise(self, poses: tuple[tuple[int, Array], ...]) -> None:
+        stamps, positions = zip(*poses, strict=True)
         times = np.array([stamp - stamps[0] for stamp in stamps]) * 1e-9
         gaps = times[:, None] - times + np.eye(4)
         weights = 1.0 / gaps.prod(axis=1)

@@ -198,9 +198,20 @@ class ScpController:
 
     # The parts of a step, for whoever decides more than the law (22) does.
 
-    def look(self, q: ArrayLike, reference: Reference) -> tuple[Posture, list[float]]:
-        """Return the posture and the error, 0 for what is not moved; see ``ControlResult``."""
-        posture = Posture(self._robot, q)
+    def look(
+        self, q: ArrayLike, reference: Reference, known: Posture | None = None
+    ) -> tuple[Posture, list[float]]:
+        """Return the posture and the error, 0 for what is not moved; see ``ControlResult``.
+
+        Args:
+            q: [w, phi], (n+5,) [m, rad].
+            reference: wanted head pose.
+            known: a posture with the same joint angles, whatever its head pose.
+
+        Raises:
+            ModelError: q has the wrong shape or is not finite.
+        """
+        posture = Posture(self._robot, q) if known is None else known.moved(np.asarray(q)[:6])
         error: list[float] = (posture.g.q[:6] - reference.w_d).tolist()
         if self._by_vector:
             # From here on velocities of the head are twists.

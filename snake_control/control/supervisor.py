@@ -96,6 +96,7 @@ class Supervisor:
         Raises:
             ConfigError: a sub-task cannot be made.
         """
+        self._robot = robot
         self._law = ScpController(robot, controller)
         self._config = supervisor
         self._period_s = period_s
@@ -105,7 +106,7 @@ class Supervisor:
         self._sub_task_speeds = SUB_TASK_SHARE * np.array(robot.joint_speed_limits_rad_s)
         self._still = [0.0] * len(robot.controlled)
         self._no_scps = np.zeros(len(robot.scp_joints))
-        self._prepared: tuple[Array, BarriersAt] | None = None
+        self._prepared: tuple[Posture, BarriersAt] | None = None
         self.rest()
 
     def rest(self) -> None:
@@ -135,14 +136,24 @@ class Supervisor:
         Raises:
             ModelError: phi is not finite.
         """
+        self._prepared = None
         if self._config.enabled:
-            self._prepared = (phi, self._barriers.at(phi))
+            self._prepared = self._worked_out(phi)
 
-    def _limits_at(self, phi: Array) -> BarriersAt:
+    def _worked_out(self, phi: Array) -> tuple[Posture, BarriersAt]:
+        on_floor = self._barriers.on_floor(phi)
+        posture = Posture.of(self._robot, on_floor)
+        # For what it leaves in the posture, of which a step takes over what it can.
+        self._law.sub_tasks(posture, self._still)
+        return posture, self._barriers.at(phi, on_floor)
+
+    def _known(self, phi: Array) -> tuple[Posture, BarriersAt]:
+        """Return a posture with these joint angles, and the limits as they are seen from there."""
         prepared, self._prepared = self._prepared, None
-        if prepared is not None and np.array_equal(prepared[0], phi):
-            return prepared[1]
-        return self._barriers.at(phi)
+        if prepared is not None and np.array_equal(prepared[0].g.q[6:], phi):
+            return prepared
+        on_floor = self._barriers.on_floor(phi)
+        return Posture.of(self._robot, on_floor), self._barriers.at(phi, on_floor)
 
     def step(
         self, q: ArrayLike, q_dot: ArrayLike | None, reference: Reference, t: float
@@ -164,9 +175,9 @@ class Supervisor:
             plain = self._law.step(q, q_dot, reference, t)
             self._u = plain.u
             return SupervisedResult(**{f.name: getattr(plain, f.name) for f in _PLAIN})
-        posture, error = self._law.look(q, reference)
-        phi = posture.g.q[6:]
-        at = self._limits_at(phi)
+        phi = np.asarray(q, dtype=float)[6:]
+        known, at = self._known(phi)
+        posture, error = self._law.look(q, reference, known)
         self._lift(at)
         # Whoever gives the velocities of the SCPs has decided what they are used for.
         given_scps = reference.phi_tilde_dot_d

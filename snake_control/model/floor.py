@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from snake_control.config import RobotConfig
-from snake_control.model.geometry import Geometry
+from snake_control.model.geometry import Geometry, checked_posture
 from snake_control.model.head_chain import HeadChain, head_chain
 from snake_control.model.rotation import rpy_from_rotation, rpy_rates
 from snake_control.model.structure import structure
@@ -47,6 +47,23 @@ def chain_pose_on_floor(robot: RobotConfig, chain: HeadChain, base: Array) -> Ar
     forward, left, up = map(turned, chain.frame)
     rpy = rpy_from_rotation(tuple(zip(forward, left, up, strict=True)))
     return np.array((*tip, *rpy.tolist()))
+
+
+def geometry_on_floor(robot: RobotConfig, phi: ArrayLike) -> Geometry:
+    """Return the geometry of a robot whose base stands level at wheel height, at the origin.
+
+    Args:
+        robot: the robot.
+        phi: joint angles, (n-1,) [rad].
+
+    Raises:
+        ModelError: phi has the wrong shape, is not finite, or beyond +-1e6.
+    """
+    s = structure(robot)
+    angles = checked_posture(s, np.concatenate((np.zeros(6), phi)))[6:]
+    chain = head_chain(s, angles[: s.n_h].tolist())
+    w = chain_pose_on_floor(robot, chain, np.zeros(3))
+    return Geometry(s, np.concatenate((w, angles)), chain)
 
 
 def base_under_head(robot: RobotConfig, phi: ArrayLike, w: ArrayLike) -> Array:

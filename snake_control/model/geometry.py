@@ -11,6 +11,7 @@ in its q stand for nothing and are not read.
 
 from __future__ import annotations
 
+import copy
 import math
 
 import numpy as np
@@ -92,15 +93,32 @@ class Geometry(PlanarBase):
     def __init__(self, s: Structure, q: Array, chain: HeadChain) -> None:
         """Work out the base part; ``chain`` belongs to the head joints of q."""
         super().__init__(s, q[6 + s.n_h :])
+        self.chain = chain
+        self._place(q)
+
+    def _place(self, q: Array) -> None:
+        chain, planar = self.chain, self.s.robot.planar
         _, _, _, roll, self.pitch, yaw = q[:6].tolist()
-        if s.robot.planar:
+        if planar:
             roll = self.pitch = 0.0
         self.q = q
-        self.chain = chain
         self.rows, pitching = base_rows(chain.frame, roll, self.pitch, yaw)
         self.attitude_axes: Rows = chain.frame[0], pitching, self.rows[2]
-        if s.robot.planar:
+        if planar:
             self.attitude_axes = ZERO, ZERO, self.rows[2]
+
+    def moved(self, w: ArrayLike) -> Geometry:
+        """Return the same joint angles with the head at another pose, (6,) [m, rad].
+
+        Raises:
+            ModelError: wrong shape, not finite, or beyond +-1e6.
+        """
+        q = checked_posture(self.s, np.concatenate((w, self.q[6:])))
+        other = copy.copy(self)
+        for of_the_pose in ("twists", "base_rotation", "base_origin"):
+            other.__dict__.pop(of_the_pose, None)
+        other._place(q)
+        return other
 
     @lazy
     def twists(self) -> Array:
@@ -167,6 +185,16 @@ def geometry(robot: RobotConfig, q: ArrayLike) -> Geometry:
             of that size has lost the digits that place the links.
     """
     s = structure(robot)
+    q = checked_posture(s, q)
+    return Geometry(s, q, head_chain(s, q[6 : 6 + s.n_h].tolist()))
+
+
+def checked_posture(s: Structure, q: ArrayLike) -> Array:
+    """Return q as an array, (n+5,).
+
+    Raises:
+        ModelError: see ``geometry``.
+    """
     q = np.asarray(q, dtype=float)
     if q.shape != (s.n + 5,):
         raise ModelError(f"q has shape {q.shape}; expected ({s.n + 5},) for {s.n} links")
@@ -175,7 +203,7 @@ def geometry(robot: RobotConfig, q: ArrayLike) -> Geometry:
         bad = [f"q[{i}] = {value:g}" for i, value in enumerate(q) if not abs(value) <= _LARGEST]
         if bad:
             raise ModelError(f"{', '.join(bad)}: give finite values, within +-{_LARGEST:g}")
-    return Geometry(s, q, head_chain(s, q[6 : 6 + s.n_h].tolist()))
+    return q
 
 
 def planar_base(s: Structure, base_angles: Array) -> PlanarBase:

@@ -21,6 +21,9 @@ Array = NDArray[np.float64]
 _LARGEST_LOG = 345.0
 """V_b1 is kept within some 1e-150 .. 1e150, so that nothing computed from it overflows."""
 
+_OF_JOINTS = ("_gram", "log_V_b1_by_base", "singular_shape")
+"""What the base joints alone decide, beside the kinematics' ``base``."""
+
 
 class Posture:
     """What cost functions and control laws read; gradients are by q, (n + 5,) each.
@@ -45,9 +48,37 @@ class Posture:
         Raises:
             ModelError: wrong shape, not finite, or beyond +-1e6.
         """
+        self._begin(robot, geometry(robot, q))
+
+    def _begin(self, robot: RobotConfig, g: Geometry) -> None:
         self.robot = robot
-        self.g: Geometry = geometry(robot, q)
-        self.k: Kinematics = kinematics(self.g)
+        self.g: Geometry = g
+        self.k: Kinematics = kinematics(g)
+
+    @classmethod
+    def of(cls, robot: RobotConfig, g: Geometry) -> Posture:
+        """Return the posture of a geometry that is worked out already."""
+        posture = cls.__new__(cls)
+        posture._begin(robot, g)
+        return posture
+
+    def moved(self, w: ArrayLike) -> Posture:
+        """Return the same joint angles with the head at another pose.
+
+        What depends on the joints alone is taken over as far as it was worked out.
+
+        Args:
+            w: pose of the head, (6,) [m, rad].
+
+        Raises:
+            ModelError: w has the wrong shape, is not finite, or beyond +-1e6.
+        """
+        other = Posture.of(self.robot, self.g.moved(w))
+        known, of_kinematics = self.__dict__, self.k.__dict__
+        other.__dict__.update({name: known[name] for name in _OF_JOINTS if name in known})
+        if "base" in of_kinematics:
+            other.k.__dict__["base"] = of_kinematics["base"]
+        return other
 
     @lazy
     def V_h(self) -> float:

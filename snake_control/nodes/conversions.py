@@ -64,19 +64,19 @@ def array(value: Point | Vector3 | Quaternion) -> Array:
 
 def vector(values: Sequence[float] | Array) -> Vector3:
     """Return three numbers as a message."""
-    x, y, z = (float(v) for v in values)
+    x, y, z = map(float, values)
     return Vector3(x=x, y=y, z=z)
 
 
 def point(values: Sequence[float] | Array) -> Point:
     """Return three numbers as a message."""
-    x, y, z = (float(v) for v in values)
+    x, y, z = map(float, values)
     return Point(x=x, y=y, z=z)
 
 
 def quaternion(values: Sequence[float] | Array) -> Quaternion:
     """Return [x, y, z, w] as a message."""
-    x, y, z, w = (float(v) for v in values)
+    x, y, z, w = map(float, values)
     return Quaternion(x=x, y=y, z=z, w=w)
 
 
@@ -174,17 +174,23 @@ def of_robot(array: DiagnosticArray, namespace: str) -> DiagnosticArray:
     return array
 
 
+def turned_covariance(turn: Array, covariance: Array) -> Array:
+    """Return a covariance of two vectors, (6, 6), after both were turned by ``turn``, (3, 3)."""
+    blocks = covariance.reshape(2, 3, 2, 3)
+    return (turn @ blocks.transpose(0, 2, 1, 3) @ turn.T).transpose(0, 2, 1, 3).reshape(6, 6)
+
+
 def odometry_message(estimate: HeadEstimate, frame_id: str, child_frame_id: str) -> Odometry:
     """Return a filtered head motion as a message: pose in the world, twist in the head's frame."""
-    to_head = estimate.rotation.inv()
+    # By rows the axes of the head, in the world.
+    to_head = estimate.rotation.as_matrix().T
     message = Odometry(header=header(estimate.stamp_ns, frame_id), child_frame_id=child_frame_id)
     message.pose.pose.position = point(estimate.position)
     message.pose.pose.orientation = quaternion(estimate.rotation.as_quat())
-    message.twist.twist.linear = vector(to_head.apply(estimate.velocity))
-    message.twist.twist.angular = vector(to_head.apply(estimate.angular_velocity))
-    turn = np.kron(np.eye(2), to_head.as_matrix())
+    message.twist.twist.linear = vector(to_head @ estimate.velocity)
+    message.twist.twist.angular = vector(to_head @ estimate.angular_velocity)
     message.pose.covariance = estimate.pose_covariance.ravel()
-    message.twist.covariance = (turn @ estimate.twist_covariance @ turn.T).ravel()
+    message.twist.covariance = turned_covariance(to_head, estimate.twist_covariance).ravel()
     return message
 
 
