@@ -28,6 +28,7 @@ _ANY_TIME = (
     "nodes/test_markers.py",
     "nodes/test_message_definitions.py",
     "nodes/test_pose_sources.py",
+    "nodes/test_process.py",
 )
 """Of these folders, what does not mind waiting."""
 

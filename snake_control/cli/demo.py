@@ -37,6 +37,7 @@ from snake_control.errors import NodeDiedError, NotReadyError, SnakeError
 from snake_control.experiment.series import Series
 from snake_control.experiment.summary import Run, summarise, write_summary
 from snake_control.experiment.table import format_summary
+from snake_control.nodes.process import leaving_the_graph
 from snake_control.nodes.recorder import FOLLOWING, STATUS_WORDS, Recorder
 from snake_control.nodes.topics import ENABLE, START, STOP, Service
 
@@ -267,8 +268,9 @@ class Demo:
         self.series.close()
         if self._executor is not None:
             self._executor.shutdown()
-            self._node.destroy_node()
-            rclpy.try_shutdown()
+            with leaving_the_graph():
+                self._node.destroy_node()
+                rclpy.try_shutdown()
 
     def _call(
         self, node: str, service: Service, request: Any, timeout_s: float, checked: bool = True

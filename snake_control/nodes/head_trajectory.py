@@ -30,7 +30,7 @@ from snake_control.config.yaml_file import read_text
 from snake_control.errors import SnakeError
 from snake_control.nodes import topics
 from snake_control.nodes.conversions import HEAD_FRAME
-from snake_control.nodes.process import EXIT_BAD_CONFIG, EXIT_FAILED
+from snake_control.nodes.process import EXIT_BAD_CONFIG, EXIT_FAILED, leaving_the_graph
 from snake_control.trajectory.course_text import parse_course
 
 _SETTLE_S = 0.5
@@ -207,8 +207,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"head_trajectory: {error}", file=sys.stderr)
         return EXIT_FAILED
     finally:
-        node.destroy_node()
-        rclpy.try_shutdown()
+        with leaving_the_graph():
+            node.destroy_node()
+            rclpy.try_shutdown()
 
 
 if __name__ == "__main__":
