@@ -57,8 +57,8 @@ class _Bench(Node):
         self._executor.add_node(self)
         self.steps: dict[int, ControllerState] = {}
         self.cycles: dict[int, BusState] = {}
-        self.following = False
-        self.text = "controller_state not heard"
+        self.following = self.bus_active = False
+        self.text = ""
 
     def spin(self, until: Callable[[], object], timeout_s: float) -> bool:
         deadline = time.monotonic() + timeout_s
@@ -84,6 +84,7 @@ class _Bench(Node):
             self.steps[_ns(message.header.stamp)] = message
 
     def hear_cycle(self, message: BusState) -> None:
+        self.bus_active = message.state == BusState.STATE_HOLDING
         # Of a command that serves two cycles the first counts.
         self.cycles.setdefault(_ns(message.command_stamp), message)
 
@@ -154,9 +155,10 @@ def _robot(bench: _Bench, relay: _Relay, directory: Path) -> tuple[_Times, tuple
     link = str(directory / "bus")
     own = {
         "mock_bus": ["-p", f"port:={link}", "-r", f"{topics.MOCAP_POSE.name}:={_RAW}"],
-        "bus_driver": ["-p", f"port:={link}"],
         "pose_input": [],
         "scp_controller": [],
+        # Not before they run: nodes that start keep two processors from the mock and from it.
+        "bus_driver": ["-p", f"port:={link}"],
         "trajectory_generator": ["-p", "autostart:=true", "-p", "start_from:=head"],
     }
     t = topics.MOCAP_POSE
@@ -182,6 +184,10 @@ def _robot(bench: _Bench, relay: _Relay, directory: Path) -> tuple[_Times, tuple
             processes.start(kind, ["--ros-args", *files, *more])
             if kind == "mock_bus" and not bench.spin(lambda: os.path.lexists(link), _START_S):
                 raise RuntimeError("the mock does not start")
+            if kind == "scp_controller" and not bench.spin(lambda: bench.text, _START_S):
+                raise RuntimeError("the controller does not start")
+            if kind == "bus_driver" and not bench.spin(lambda: bench.bus_active, _START_S):
+                raise RuntimeError("the driver does not start")
         if not bench.spin(lambda: bench.following, _START_S):
             raise RuntimeError(f"the robot does not follow: {bench.text}")
         bench.spin_for(SETTLE_S)

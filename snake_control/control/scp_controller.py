@@ -211,7 +211,10 @@ class ScpController:
         Raises:
             ModelError: q has the wrong shape or is not finite.
         """
-        posture = Posture(self._robot, q) if known is None else known.moved(np.asarray(q)[:6])
+        if known is None:
+            posture = Posture(self._robot, q)
+        else:
+            posture = known if np.array_equal(known.g.q, q) else known.moved(np.asarray(q)[:6])
         error: list[float] = (posture.g.q[:6] - reference.w_d).tolist()
         if self._by_vector:
             # From here on velocities of the head are twists.

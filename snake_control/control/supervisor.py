@@ -127,31 +127,30 @@ class Supervisor:
         self._reference_scale = before._reference_scale
         self._begins = False
 
-    def prepare(self, phi: Array) -> None:
-        """Work out what depends on the joints alone, for whoever has time before the step.
+    def prepare(self, phi: Array, w: Array | None = None) -> None:
+        """Work out what the step will ask of a posture, for whoever has time before it.
 
         Args:
-            phi: joint angles, (n-1,) [rad]; a step with others works it out itself.
+            phi: joint angles, (n-1,) [rad]; a step with others works out everything itself.
+            w: pose of the head, (6,) [m, rad], if that is known as well; a step with another takes
+                over what the joints alone decide.
 
         Raises:
-            ModelError: phi is not finite.
+            ModelError: not finite, or the wrong shape.
         """
-        self._prepared = None
-        if self._config.enabled:
-            self._prepared = self._worked_out(phi)
-
-    def _worked_out(self, phi: Array) -> tuple[Posture, BarriersAt]:
-        on_floor = self._barriers.on_floor(phi)
-        posture = Posture.of(self._robot, on_floor)
-        # For what it leaves in the posture, of which a step takes over what it can.
+        if not self._config.enabled:
+            return
+        posture, limits = self._known(phi)
+        if w is not None:
+            posture = posture.moved(w)
+        # For what it leaves in the posture.
         self._law.sub_tasks(posture, self._still)
-        return posture, self._barriers.at(phi, on_floor)
+        self._prepared = posture, limits
 
     def _known(self, phi: Array) -> tuple[Posture, BarriersAt]:
         """Return a posture with these joint angles, and the limits as they are seen from there."""
-        prepared, self._prepared = self._prepared, None
-        if prepared is not None and np.array_equal(prepared[0].g.q[6:], phi):
-            return prepared
+        if self._prepared is not None and np.array_equal(self._prepared[0].g.q[6:], phi):
+            return self._prepared
         on_floor = self._barriers.on_floor(phi)
         return Posture.of(self._robot, on_floor), self._barriers.at(phi, on_floor)
 

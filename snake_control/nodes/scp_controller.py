@@ -12,6 +12,7 @@ import time
 from typing import Any
 
 import numpy as np
+from nav_msgs.msg import Odometry
 from numpy.typing import NDArray
 from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
@@ -90,6 +91,7 @@ class ScpControllerNode(Node):
         self._latest = Step.at(0, config.robot)
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._origin_ns = self._steady.now().nanoseconds
+        self._phi: Array | None = None
         # Roll, pitch and yaw go on without jumps by whole turns.
         self._rpy = np.zeros(3)
         self._rpy_d = np.zeros(3)
@@ -102,7 +104,7 @@ class ScpControllerNode(Node):
         self._head = Input(
             topics.HEAD_ODOMETRY.name,
             own.head_timeout_s,
-            lambda message: head_motion(message, own.frame_id),
+            self._head_motion,
         )
         self._reference = Input(
             topics.HEAD_REFERENCE.name,
@@ -141,7 +143,16 @@ class ScpControllerNode(Node):
         # Now there is time; at the tick it would delay the command. The step says what fails.
         with contextlib.suppress(*NO_ANSWER):
             self._controller.prepare(phi)
+        self._phi = phi
         return phi, phi_dot
+
+    def _head_motion(self, message: Odometry) -> tuple[Array, Array]:
+        w, w_dot = head_motion(message, self._own.frame_id)
+        w[3:] = self._rpy = unwrap_near(w[3:], self._rpy)
+        if self._phi is not None:
+            with contextlib.suppress(*NO_ANSWER):
+                self._controller.prepare(self._phi, w)
+        return w, w_dot
 
     def _hear_bus(self, message: BusState) -> None:
         self._bus = (self._steady.now().nanoseconds, message)
@@ -200,9 +211,7 @@ class ScpControllerNode(Node):
         if problem := self._head.problem(now):
             problems.append(problem)
         else:
-            w, w_dot = self._head.value
-            self._rpy = unwrap_near(w[3:], self._rpy)
-            step.w = np.concatenate([w[:3], self._rpy])
+            step.w, w_dot = self._head.value
         if problem := self._joint_states.problem(now):
             problems.append(problem)
         else:

@@ -248,12 +248,14 @@ def test_thresholds_that_contradict_each_other_are_refused(
         SupervisorConfig(**given)
 
 
-def test_what_was_prepared_changes_nothing_and_is_not_used_for_other_angles() -> None:
+def test_what_was_prepared_changes_nothing_and_is_not_used_elsewhere() -> None:
     robot, prepared = GuidedRobot(load_case((), 3)), GuidedRobot(load_case((), 3))
     reference = Reference(robot.state.w + np.array([0.02, 0, 0, 0, 0, 0.1]), np.zeros(6))
     for i in range(40):
-        phi = prepared.state.phi
+        phi, w = prepared.state.phi, prepared.state.w
         prepared._supervisor.prepare(phi if i % 3 else phi + 0.2)
+        if i % 2:
+            prepared._supervisor.prepare(phi, w if i % 5 else w + 0.1)
         a, b = robot.cycle(reference), prepared.cycle(reference)
         np.testing.assert_array_equal(a.result.u, b.result.u)
         assert a.result.bound == b.result.bound

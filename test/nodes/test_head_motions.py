@@ -159,9 +159,8 @@ def test_a_refused_request_leaves_what_goes_on_alone(robot, client):
     client.wait_moving()
     status, result = client.follow(client.poses((0.1, 0, 0, 0, 0, 0)), speed=0.5)
     assert (status, result.code) == (GoalStatus.STATUS_ABORTED, Result.INVALID), result.text
-    assert not goes_on.done()
-    client.goal = goes_on
-    status, result = client.result()
+    assert not goes_on.over
+    status, result = goes_on.result()
     assert (status, result.code) == (GoalStatus.STATUS_SUCCEEDED, Result.NONE), result.text
     assert jumps(robot) <= 0.0
 

@@ -7,53 +7,46 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from rclpy.action import ActionClient
-from snake_interfaces.action import FollowHeadTrajectory
+from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 
 from snake_control.nodes import topics
 from snake_control.nodes.conversions import array, pose_message, stamp_ns
+from support.action_client import Goals, Sent
 from support.perfect_head import PerfectHead
 from support.whole_graph import WholeGraph
 
 
 class HeadClient:
-    """Sends goals, calls services, and keeps feedback and status."""
+    """Sends goals, calls services, and keeps feedback and status.
+
+    Attributes:
+        goal: the one that was sent last.
+    """
+
+    goal: Sent
 
     def __init__(self, robot: WholeGraph | PerfectHead) -> None:
         self.robot, self.graph = robot, robot.graph
-        action = topics.FOLLOW_HEAD_TRAJECTORY
-        self._client = ActionClient(self.graph.node, action.type, action.name)
-        self.graph.wait_for(self._client.server_is_ready, 30.0, "the action server")
-        self.feedback: list = []
+        self._goals = Goals(self.graph, topics.FOLLOW_HEAD_TRAJECTORY)
+        self.feedback = self._goals.feedback
 
     def poses(self, *ways: tuple[float, ...]) -> list:
         """Poses by their distance from where the head is now."""
         return [pose_message(self.robot.w + np.array(way)) for way in ways]
 
-    def send(self, poses: list = (), frame: str = "world", **more: Any) -> Any:
-        """Send a goal; return its handle."""
-        goal = FollowHeadTrajectory.Goal(poses=list(poses), **more)
-        goal.header.frame_id = frame
-        sent = self._client.send_goal_async(
-            goal, feedback_callback=lambda m: self.feedback.append(m.feedback)
-        )
-        self.graph.wait_for(sent.done, 20.0, "acceptance")
-        handle = sent.result()
-        assert handle.accepted
-        self.goal = handle.get_result_async()
-        return handle
+    def send(self, poses: list = (), frame: str = "world", **more: Any) -> Sent:
+        """Send a goal."""
+        self.goal = self._goals.send(header=Header(frame_id=frame), poses=list(poses), **more)
+        return self.goal
 
     def result(self, timeout_s: float = 60.0) -> tuple[int, Any]:
         """Wait for the status and result of the goal sent last."""
-        self.graph.wait_for(self.goal.done, timeout_s, "the result")
-        got = self.goal.result()
-        return got.status, got.result
+        return self.goal.result(timeout_s)
 
     def follow(self, poses: list = (), **more: Any) -> tuple[int, Any]:
         """Send a goal and wait for its end."""
-        self.send(poses, **more)
-        return self.result()
+        return self.send(poses, **more).result()
 
     def wait_moving(self) -> None:
         """Wait until the goal sent last has moved the head by a tenth of its way."""
