@@ -84,7 +84,7 @@ class _Bench(Node):
             self.steps[_ns(message.header.stamp)] = message
 
     def hear_cycle(self, message: BusState) -> None:
-        self.bus_active = message.state == BusState.STATE_HOLDING
+        self.bus_active = message.state in (BusState.STATE_HOLDING, BusState.STATE_MOVING)
         # Of a command that serves two cycles the first counts.
         self.cycles.setdefault(_ns(message.command_stamp), message)
 

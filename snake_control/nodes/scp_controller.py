@@ -92,8 +92,7 @@ class ScpControllerNode(Node):
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._origin_ns = self._steady.now().nanoseconds
         self._phi: Array | None = None
-        # Roll, pitch and yaw go on without jumps by whole turns.
-        self._rpy = np.zeros(3)
+        self._w: Array | None = None
         self._rpy_d = np.zeros(3)
 
         self._joint_states = Input(
@@ -140,19 +139,26 @@ class ScpControllerNode(Node):
 
     def _joint_motion(self, message: JointState) -> tuple[Array, Array]:
         phi, phi_dot = joint_motion(message, self._robot.joint_names)
-        # Now there is time; at the tick it would delay the command. The step says what fails.
-        with contextlib.suppress(*NO_ANSWER):
-            self._controller.prepare(phi)
         self._phi = phi
+        self._prepare()
         return phi, phi_dot
 
     def _head_motion(self, message: Odometry) -> tuple[Array, Array]:
         w, w_dot = head_motion(message, self._own.frame_id)
-        w[3:] = self._rpy = unwrap_near(w[3:], self._rpy)
-        if self._phi is not None:
-            with contextlib.suppress(*NO_ANSWER):
-                self._controller.prepare(self._phi, w)
+        if self._w is not None:
+            # Roll, pitch and yaw go on without jumps by whole turns.
+            w[3:] = unwrap_near(w[3:], self._w[3:])
+        self._w = w
+        self._prepare()
         return w, w_dot
+
+    def _prepare(self) -> None:
+        """Work out now, while there is time, what would delay the command at the tick."""
+        if self._phi is None or self._w is None:
+            return
+        # The step will say what fails.
+        with contextlib.suppress(*NO_ANSWER):
+            self._controller.prepare(self._phi, self._w)
 
     def _hear_bus(self, message: BusState) -> None:
         self._bus = (self._steady.now().nanoseconds, message)
