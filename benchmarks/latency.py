@@ -6,13 +6,14 @@ while, the mock at the other end of the port. How long a message waited for a ti
 controller or the driver (and for the transaction that was on the bus) the nodes say themselves;
 all else is the rest.
 
-The relay has as many messages between as many processes. It runs all the time: beside the robot,
-half an interval after the robot's poses, so that both meet the same machine at the same load; and
-alone before, which says what that load is worth.
+The relay has as many messages between as many processes, as often as there are commands. It runs
+all the time: beside the robot, between the robot's poses, so that both meet the same machine at the
+same load; and alone before, which says what that load is worth.
 """
 
 from __future__ import annotations
 
+import itertools
 import json
 import os
 import signal
@@ -37,6 +38,7 @@ from snake_control.cli.ros_domain import own_domain
 from snake_control.nodes import topics
 
 POSES_HZ = 100.0
+COMMANDS_HZ = 50.0
 RELAY_S = 8.0
 ROBOT_S = 24.0
 SETTLE_S = 4.0
@@ -133,7 +135,7 @@ class _Relay:
 
 def _relay_alone(bench: _Bench, relay: _Relay) -> tuple[float, float]:
     """Send poses through the relay for a while; return when that began and ended."""
-    timer = bench.create_timer(1.0 / POSES_HZ, relay.send)
+    timer = bench.create_timer(1.0 / COMMANDS_HZ, relay.send)
     bench.spin_for(SETTLE_S)
     begun = bench.now()
     bench.spin_for(RELAY_S)
@@ -164,9 +166,12 @@ def _robot(bench: _Bench, relay: _Relay, directory: Path) -> tuple[_Times, tuple
     t = topics.MOCAP_POSE
     pose = bench.create_publisher(t.type, t.name, t.qos)
 
+    turns = itertools.cycle([True] + [False] * (round(POSES_HZ / COMMANDS_HZ) - 1))
+
     def pass_on(message: PoseStamped) -> None:
         pose.publish(bench.stamp(message))
-        between.reset()
+        if next(turns):
+            between.reset()
 
     def send_between() -> None:
         between.cancel()

@@ -42,6 +42,7 @@ from snake_control.nodes.bus_messages import (
 from snake_control.nodes.bus_requests import NotLoweredError
 from snake_control.nodes.bus_snapshot import Snapshot, State
 from snake_control.nodes.conversions import of_robot, stamp_ns
+from snake_control.nodes.endpoints import Endpoints
 from snake_control.nodes.managed import ManagedNode, logged
 from snake_control.nodes.parameters import NodeParameters
 from snake_control.nodes.process import THREAD_SWITCH_S, run
@@ -85,14 +86,14 @@ class BusDriver(ManagedNode):
         self._joint_stamp_ns = 0
         self._ignored = 0
         self._ignored_logged_at = 0.0
-        self._joint_states = self._publisher(topics.JOINT_STATES)
-        self._bus_state = self._publisher(topics.BUS_STATE)
-        self._diagnostics = self._publisher(topics.DIAGNOSTICS)
-        self._emergency_active = self._publisher(topics.EMERGENCY_STOP_ACTIVE)
+        ends = Endpoints(self)
+        self._joint_states = ends.publisher(topics.JOINT_STATES)
+        self._bus_state = ends.publisher(topics.BUS_STATE)
+        self._diagnostics = ends.publisher(topics.DIAGNOSTICS)
+        self._emergency_active = ends.publisher(topics.EMERGENCY_STOP_ACTIVE)
         self._loop = BusLoop(self._config, self._publish, self._warn, self._complain)
         self._tell_emergency()
-        command = topics.JOINT_VELOCITY_COMMAND
-        self.create_subscription(command.type, command.name, self._take_command, command.qos)
+        ends.subscription(topics.JOINT_VELOCITY_COMMAND, self._take_command)
         self.serve_slowly(topics.SET_TORQUE, self._set_torque)
         self.serve_slowly(topics.RECOVER, self._recover)
         self._serve(topics.EMERGENCY_STOP, self._emergency_stop)
@@ -355,9 +356,6 @@ class BusDriver(ManagedNode):
             response.success, response.message = True, done
             self.get_logger().info(done)
         return response
-
-    def _publisher(self, topic: topics.Topic):  # type: ignore[no-untyped-def]
-        return self.create_publisher(topic.type, topic.name, topic.qos)
 
     def _serve(self, service: topics.Service, callback) -> None:  # type: ignore[no-untyped-def]
         self.create_service(service.type, service.name, callback)

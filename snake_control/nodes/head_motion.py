@@ -28,6 +28,7 @@ from snake_control.experiment.rehearsal import Rehearsal, rehearse
 from snake_control.model.rotation import wrap
 from snake_control.nodes import topics
 from snake_control.nodes.conversions import header
+from snake_control.nodes.endpoints import Endpoints
 from snake_control.trajectory.head_trajectory import HeadTrajectory
 from snake_control.trajectory.plan import Course, Plan
 from snake_control.trajectory.segments import line_to
@@ -154,6 +155,7 @@ class HeadMotion:
     def __init__(
         self,
         node: Node,
+        ends: Endpoints,
         config: Config,
         sequence: ReferenceSequence,
         on_path: Callable[[Movable], None],
@@ -161,7 +163,7 @@ class HeadMotion:
         """Wait for requests.
 
         Args:
-            node: where.
+            node, ends: where.
             config: robot, controller, supervisor and the generator's own group.
             sequence: what sends references.
             on_path: told of a motion that begins, or is to be shown.
@@ -179,8 +181,7 @@ class HeadMotion:
         self._last_begin: Array | None = None
         self._ending = threading.Event()
         self._worker = ThreadPoolExecutor(1, thread_name_prefix="rehearsal")
-        t = topics.HEAD_TRAJECTORY_STATUS
-        self._status = node.create_publisher(t.type, t.name, t.qos)
+        self._status = ends.publisher(topics.HEAD_TRAJECTORY_STATUS)
 
     def close(self) -> None:
         """Take no more requests; a rehearsal ends at once."""

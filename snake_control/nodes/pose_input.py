@@ -10,10 +10,7 @@ import dataclasses
 from typing import Any
 
 from rclpy.clock import Clock, ClockType
-from rclpy.event_handler import QoSRequestedIncompatibleQoSInfo, SubscriptionEventCallbacks
 from rclpy.node import Node
-from rclpy.qos import qos_policy_name_from_kind
-from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.subscription import Subscription
 from sensor_msgs.msg import JointState
 from snake_interfaces.msg import PoseStatus
@@ -33,6 +30,7 @@ from snake_control.nodes.conversions import (
     of_robot,
     stamp_ns,
 )
+from snake_control.nodes.endpoints import Endpoints
 from snake_control.nodes.inputs import FUTURE_TOLERANCE_S
 from snake_control.nodes.parameters import NodeParameters
 from snake_control.nodes.pose_messages import (
@@ -41,12 +39,10 @@ from snake_control.nodes.pose_messages import (
     diagnostics,
     status_message,
 )
-from snake_control.nodes.pose_publishers import PublisherWatch, type_name
 from snake_control.nodes.pose_sources import Convert, Feed, feeds
 from snake_control.nodes.process import run
 
 _STATUS_PERIOD_S = 0.1
-_LOOK_PERIOD_S = 1.0
 _RATE_WINDOW_NS = 1_000_000_000
 _LATE = 0.5
 """A pose that was older on arrival, as a share of its time-out, is late by itself."""
@@ -95,33 +91,25 @@ class PoseInput(Node):
         self._diagnosed: Verdict | None = None
         self._diagnosed_ns = 0
 
-        t = topics.HEAD_ODOMETRY
-        self._odometry = self.create_publisher(t.type, t.name, t.qos)
-        t = topics.HEAD_STATUS
-        self._status = self.create_publisher(t.type, t.name, t.qos)
-        t = topics.DIAGNOSTICS
-        self._diagnostics = self.create_publisher(t.type, t.name, t.qos)
+        self._endpoints = Endpoints(self)
+        self._odometry = self._endpoints.publisher(topics.HEAD_ODOMETRY)
+        self._status = self._endpoints.publisher(topics.HEAD_STATUS)
+        self._diagnostics = self._endpoints.publisher(topics.DIAGNOSTICS)
         first, *others = feeds(self._config)
-        self._senders = PublisherWatch(self, type_name(first.topic.type))
         self._subscription = self._subscribe(first)
         for feed in others:
             self._subscribe(feed)
         if self._bridge is not None or self._watch is not None:
             # All of them count, not only the newest.
-            t = topics.JOINT_STATES
-            self.create_subscription(t.type, t.name, self._receive_joints, t.qos)
+            self._endpoints.subscription(topics.JOINT_STATES, self._receive_joints)
         self.create_timer(_STATUS_PERIOD_S, self._report, clock=self._steady)
-        self.create_timer(_LOOK_PERIOD_S, self._look, clock=self._steady)
 
     def _subscribe(self, feed: Feed) -> Subscription:
-        t = feed.topic
-        return self.create_subscription(
-            t.type,
-            t.name,
+        return self._endpoints.subscription(
+            feed.topic,
             lambda message: self._receive(message, feed.convert),
-            t.qos,
-            event_callbacks=SubscriptionEventCallbacks(incompatible_qos=self._on_incompatible_qos),
-            qos_overriding_options=QoSOverridingOptions.with_default_policies(),
+            overriding=True,
+            hint=" (see the parameter source)",
         )
 
     def _receive(self, message: Any, convert: Convert) -> None:
@@ -227,7 +215,8 @@ class PoseInput(Node):
 
     def _judge_poses(self, now: int, prediction: Prediction | None) -> Verdict:
         estimate, steady_ns = self._intake.estimate, self._steady_ns()
-        remarks = [self._intake.clock.problem, self._senders.problem, self._joints_problem]
+        senders = self._endpoints.ends(self._subscription)
+        remarks = [self._intake.clock.problem, senders.problem, self._joints_problem]
         if self._news and steady_ns - self._news_ns < _NEWS_NS:
             remarks.append(self._news)
         bridged = "" if prediction is None else self._bridged(prediction)
@@ -240,7 +229,7 @@ class PoseInput(Node):
         none = PoseStatus.REASON_NONE
         if estimate is None:
             text = f"no pose received yet on {self._subscription.topic_name.lstrip('/')}"
-            if not (self._senders.fitting or self._senders.problem):
+            if not (senders.fitting or senders.problem):
                 text += ": nobody publishes it"
             return Verdict(PoseStatus.STATUS_WAITING, none, text, remark)
         if bridged:
@@ -297,7 +286,7 @@ class PoseInput(Node):
             now,
             self._config.frame_id,
             self._rate(),
-            self._senders.fitting,
+            self._endpoints.ends(self._subscription).fitting,
             0 if self._bridge is None else self._bridge.gaps,
         )
         self._status.publish(status)
@@ -317,21 +306,6 @@ class PoseInput(Node):
         self._diagnosed, self._diagnosed_ns = verdict, steady_ns
         array = diagnostics(status, verdict, self._intake, self._subscription.topic_name)
         self._diagnostics.publish(of_robot(array, self.get_namespace()))
-
-    def _look(self) -> None:
-        """See who publishes, and what is wrong with the clocks; tell it once."""
-        before = self._senders.problem
-        self._senders.look(self._subscription)
-        if self._senders.problem and self._senders.problem != before:
-            self.get_logger().warning(self._senders.problem)
-
-    def _on_incompatible_qos(self, event: QoSRequestedIncompatibleQoSInfo) -> None:
-        policy = qos_policy_name_from_kind(event.last_policy_kind)
-        self.get_logger().warning(
-            f"a publisher of {self._subscription.topic_name} offers another quality of service "
-            f"than is asked for ({policy}): nothing of it can be heard"
-        )
-        self._look()
 
     def _rate(self) -> float:
         """Arrival frequency over the last second [Hz]."""

@@ -28,6 +28,7 @@ from snake_control.model.rotation import unwrap_near
 from snake_control.nodes import topics
 from snake_control.nodes.controller_messages import ControllerMessages, Step, judge, too_far
 from snake_control.nodes.conversions import head_motion, joint_motion, reference_from
+from snake_control.nodes.endpoints import Endpoints
 from snake_control.nodes.inputs import Fault, Input, Problem
 from snake_control.nodes.joint_action import Surroundings
 from snake_control.nodes.markers import RobotMarkers
@@ -110,25 +111,21 @@ class ScpControllerNode(Node):
             own.reference_timeout_s,
             lambda message: reference_from(message, own.frame_id),
         )
+        ends = Endpoints(self)
         for topic, source in (
             (topics.JOINT_STATES, self._joint_states),
             (topics.HEAD_ODOMETRY, self._head),
             (topics.HEAD_REFERENCE, self._reference),
         ):
-            self.create_subscription(topic.type, topic.name, source.receive, topic.newest_only)
+            ends.subscription(topic, source.receive, topic.newest_only)
 
         t = topics.BUS_STATE
-        self.create_subscription(t.type, t.name, self._hear_bus, t.newest_only)
+        ends.subscription(t, self._hear_bus, t.newest_only)
+        ends.subscription(topics.HEAD_PLANNED_PATH, self._drawn.follow)
 
-        t = topics.HEAD_PLANNED_PATH
-        self.create_subscription(t.type, t.name, self._drawn.follow, t.qos)
-
-        t = topics.JOINT_VELOCITY_COMMAND
-        self._command = self.create_publisher(t.type, t.name, t.qos)
-        t = topics.CONTROLLER_STATE
-        self._state = self.create_publisher(t.type, t.name, t.qos)
-        t = topics.MARKERS
-        self._markers = self.create_publisher(t.type, t.name, t.qos)
+        self._command = ends.publisher(topics.JOINT_VELOCITY_COMMAND)
+        self._state = ends.publisher(topics.CONTROLLER_STATE)
+        self._markers = ends.publisher(topics.MARKERS)
         self.create_service(topics.ENABLE.type, topics.ENABLE.name, self._on_enable)
         self._actions = (
             PostureAction(self, lambda: self._configured.config, self._busy),

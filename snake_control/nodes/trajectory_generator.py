@@ -48,6 +48,7 @@ from snake_control.nodes.conversions import (
     reference_message,
     stamp_ns,
 )
+from snake_control.nodes.endpoints import Endpoints
 from snake_control.nodes.head_action import HeadAction
 from snake_control.nodes.head_messages import MessageMotion, path_motion, trajectory_motion
 from snake_control.nodes.head_motion import HeadMotion, Movable, Request, Surroundings
@@ -92,29 +93,26 @@ class TrajectoryGenerator(Node):
             config.head_timeout_s,
             lambda message: joint_motion(message, configured.robot.joint_names)[0],
         )
-        self._motion = HeadMotion(self, configured, self._sequence, self._publish_plan)
+        ends = Endpoints(self)
+        self._motion = HeadMotion(self, ends, configured, self._sequence, self._publish_plan)
         self._action = HeadAction(self, self._motion, config.frame_id, self._steady_s)
         for t, convert in (
             (topics.HEAD_PATH, path_motion),
             (topics.HEAD_TRAJECTORY, trajectory_motion),
         ):
-            self.create_subscription(
-                t.type, t.name, partial(self._on_motion, t.name, convert), t.qos
-            )
+            ends.subscription(t, partial(self._on_motion, t.name, convert))
 
-        t = topics.HEAD_REFERENCE
-        self._reference = self.create_publisher(t.type, t.name, t.qos)
-        t = topics.HEAD_PLANNED_PATH
-        self._path = self.create_publisher(t.type, t.name, t.qos)
-        t = topics.HEAD_ODOMETRY
-        self.create_subscription(t.type, t.name, self._head.receive, t.newest_only)
-        t = topics.JOINT_STATES
-        self.create_subscription(t.type, t.name, self._joints.receive, t.newest_only)
-        t = topics.CONTROLLER_STATE
-        self.create_subscription(t.type, t.name, self._on_controller_state, t.newest_only)
+        self._reference = ends.publisher(topics.HEAD_REFERENCE)
+        self._path = ends.publisher(topics.HEAD_PLANNED_PATH)
+        for t, take in (
+            (topics.HEAD_ODOMETRY, self._head.receive),
+            (topics.JOINT_STATES, self._joints.receive),
+            (topics.CONTROLLER_STATE, self._on_controller_state),
+        ):
+            ends.subscription(t, take, t.newest_only)
         t = topics.CMD_VEL if config.cmd_vel_stamped else topics.CMD_VEL_UNSTAMPED
         callback = self._on_cmd_vel if config.cmd_vel_stamped else self._on_unstamped_cmd_vel
-        self.create_subscription(t.type, t.name, callback, t.qos)
+        ends.subscription(t, callback, hint=" (see the parameter cmd_vel_stamped)")
         self.create_service(topics.STOP.type, topics.STOP.name, self._on_stop)
         # These wait for a rehearsal, and must not keep the others waiting.
         group = ReentrantCallbackGroup()

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from geometry_msgs.msg import Twist, TwistStamped
 from nav_msgs.msg import Odometry
-from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.duration import Duration
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_srvs.srv import Trigger
 
 from snake_control.nodes import topics
@@ -277,15 +278,33 @@ def test_without_a_head_pose_cmd_vel_starts_nothing():
         assert rig.references.last is None
 
 
-def test_an_incompatible_publisher_is_reported():
+def test_those_who_do_not_fit_are_reported_once_on_both_sides():
     with Graph() as graph:
         rig = Rig(graph)
-        qos = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
-        graph.node.create_publisher(TwistStamped, topics.CMD_VEL.name, qos)
-        graph.wait_for(
-            lambda: "incompatible QoS" in rig.process.output(), 20.0, "the report of the QoS"
+        graph.start("pose_input", arguments=["-r", f"{topics.HEAD_STATUS.name}:=cmd_vel"])
+        unreliable = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+        graph.node.create_publisher(TwistStamped, topics.CMD_VEL.name, unreliable)
+        latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        t = topics.HEAD_REFERENCE
+        graph.node.create_subscription(t.type, t.name, print, latched)
+        who = graph.node.get_fully_qualified_name()
+        reports = (
+            f"{who} cannot be heard on /cmd_vel, its quality of service does not fit",
+            "/pose_input publishes /cmd_vel as snake_interfaces/msg/PoseStatus, not as "
+            "geometry_msgs/msg/TwistStamped (see the parameter cmd_vel_stamped)",
+            f"{who} cannot hear on /head/reference, its quality of service does not fit",
         )
-        assert "cmd_vel" in rig.process.output()
+        for text in reports:
+            graph.wait_for(lambda text=text: text in rig.process.output(), 20.0, text)
+        # What comes later is reported in its turn, and what was said is not said again.
+        t = topics.HEAD_PLANNED_PATH
+        hasty = QoSProfile(depth=1, deadline=Duration(seconds=1))
+        graph.node.create_subscription(t.type, t.name, print, hasty)
+        graph.wait_for(
+            lambda: "cannot hear on /head/planned_path" in rig.process.output(), 20.0, "the last"
+        )
+        for text in reports:
+            assert rig.process.output().count(text) == 1
 
 
 @pytest.mark.parametrize(("frame", "rate"), [("world", [0.02, 0, 0]), ("link_1", [0, 0.02, 0])])
