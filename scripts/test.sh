@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# All tests: those in simulated time on all processors, then those of whole processes one at a time,
-# because nodes rightly stop when a machine keeps them waiting.
+# All tests: those in simulated time on all processors, then those of single nodes two at a time, for
+# they mostly wait, and those of whole robots one at a time: nodes rightly stop when a machine keeps
+# them waiting.
 #   scripts/test.sh [pytest options]
 # Not -u: the scripts that colcon makes read unset variables.
 cd "$(dirname "${BASH_SOURCE[0]}")/.." || exit
@@ -13,5 +14,7 @@ run() { # pytest options...; of a selection, one of the two parts may have no te
 }
 run -m "not real_time" -n auto "$@"
 [ "$failed" -le 1 ] || exit "$failed"
-run -m real_time "$@"
+run -m "real_time and not alone" -n 2 --dist loadfile "$@"
+[ "$failed" -le 1 ] || exit "$failed"
+run -m "real_time and alone" "$@"
 exit "$failed"

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-_REAL_TIME = ("nodes", "cli", "faults", "poses", "launch_files")
+_REAL_TIME = ("nodes", "cli", "faults", "heads", "poses", "launch_files")
 _ANY_TIME = (
     "cli/test_demo_arguments.py",
     "cli/test_evaluate.py",
@@ -19,6 +19,7 @@ _ANY_TIME = (
     "cli/test_recording.py",
     "cli/test_scp_study.py",
     "faults/test_check.py",
+    "heads/test_campaign.py",
     "nodes/test_bus_decision.py",
     "nodes/test_bus_driver_parts.py",
     "nodes/test_conversions.py",
@@ -31,6 +32,18 @@ _ANY_TIME = (
     "nodes/test_process.py",
 )
 """Of these folders, what does not mind waiting."""
+_ALONE = (
+    "cli/test_demo.py",
+    "faults/",
+    "heads/",
+    "nodes/test_bus_session.py",
+    "nodes/test_follow_head_trajectory.py",
+    "nodes/test_posture_actions.py",
+    "nodes/test_two_robots.py",
+    "nodes/test_whole_graph.py",
+    "poses/",
+)
+"""Of the others, what needs a machine for itself: a whole robot, or a measured time."""
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
@@ -44,6 +57,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         path = item.path.relative_to(here)
         if path.parts[0] in _REAL_TIME and path.as_posix() not in _ANY_TIME:
             item.add_marker(pytest.mark.real_time)
+            if path.as_posix().startswith(_ALONE):
+                item.add_marker(pytest.mark.alone)
             if config.pluginmanager.hasplugin("rerunfailures"):
                 item.add_marker(pytest.mark.flaky(reruns=1))
 

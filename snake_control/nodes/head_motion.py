@@ -134,6 +134,7 @@ class _Run:
     job: Future[_Prepared] | None = None
     plan: Plan | None = None
     phase: str = ""
+    headless_since: float | None = None
     began: float | None = None
     arriving_since: float | None = None
     stopped_since: float | None = None
@@ -317,7 +318,12 @@ class HeadMotion:
             return
         start = self._sequence.here(around.now, around.head)
         if start is None:
-            self._end(run, Status.NO_HEAD, _NO_HEAD, around)
+            # A rehearsal can keep a busy computer from hearing the head just when it ends.
+            since = run.headless_since = run.headless_since or around.now
+            if around.now - since < _INPUT_WAIT_S:
+                self._tell(run, around, "waiting")
+            else:
+                self._end(run, Status.NO_HEAD, _NO_HEAD, around)
             return
         plan = prepared.plan
         # Preparing has taken a moment, in which the reference may have gone on.

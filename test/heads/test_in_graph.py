@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import pytest
 from heads.in_graph import Campaign, shortest
 
 from support.head_trajectories import HOSTILE_KINDS
 from support.whole_graph import WholeGraph
-
-pytestmark = pytest.mark.real_time
 
 
 def test_what_the_robot_can_do_is_done_and_a_jumping_reference_is_ridden_out(tmp_path):

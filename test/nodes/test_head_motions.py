@@ -165,6 +165,36 @@ def test_a_refused_request_leaves_what_goes_on_alone(robot, client):
     assert jumps(robot) <= 0.0
 
 
+@pytest.mark.parametrize("comes_back", [True, False], ids=["in time", "too late"])
+def test_a_head_that_is_not_heard_when_the_rehearsal_ends_is_waited_for(robot, client, comes_back):
+    client.feedback.clear()
+    # Half a minute of motion, so that the rehearsal takes longer than the head needs to be stale.
+    client.send(client.poses(*[(0.05 * (i % 2), 0, 0, 0, 0, 0) for i in range(1, 9)]), speed=0.01)
+    phases = []
+
+    def in_phase(phase):
+        phases[:] = [feedback.phase for feedback in client.feedback]
+        return phase in phases
+
+    client.graph.wait_for(lambda: in_phase("rehearsing"), 20.0, "the rehearsal")
+    robot.silent = True
+    try:
+        client.graph.wait_for(lambda: in_phase("waiting"), 20.0, "waiting for the head")
+        if comes_back:
+            robot.silent = False
+            client.graph.wait_for(lambda: in_phase("moving"), 20.0, "motion")
+            client.goal.cancel()
+        status, result = client.result()
+    finally:
+        robot.silent = False
+    if comes_back:
+        assert (status, result.code) == (GoalStatus.STATUS_CANCELED, Result.CANCELED)
+    else:
+        assert (status, result.code) == (GoalStatus.STATUS_ABORTED, Result.NO_HEAD)
+        assert result.text == "no fresh head/odometry"
+        assert not in_phase("moving")
+
+
 def path_ahead(robot: PerfectHead, *ways: float, stamp_s: float = 0.0, step_s: float = 0.0) -> Path:
     """A path along x from where the head is; stamps from now on, where a step is given."""
     message = Path(header=header(robot.graph.now_ns(), "world"))
