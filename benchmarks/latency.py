@@ -4,7 +4,7 @@ Three messages between four processes: this one sends the pose, ``pose_input`` t
 ``scp_controller`` the command, and ``bus_driver`` writes goals. The robot follows its line the
 while, the mock at the other end of the port. How long a message waited for a tick of the
 controller or the driver (and for the transaction that was on the bus) the nodes say themselves;
-all else is the rest.
+all else is the rest. What the controller works out while a message waits is in the waiting.
 
 The relay has as many messages between as many processes, as often as there are commands. It runs
 all the time: beside the robot, between the robot's poses, so that both meet the same machine at the
@@ -117,8 +117,14 @@ class _Relay:
     def send(self) -> None:
         self._publisher.publish(self._bench.stamp(PoseStamped()))
 
-    def end(self) -> list[tuple[float, float]]:
-        """Return when each pose was sent, on the clock of stamps, and how long it took [s]."""
+    def times(self) -> list[tuple[float, float]]:
+        """Return when each pose was sent, on the clock of stamps, and how long it took [s].
+
+        The last process writes them when it ends.
+        """
+        return [(sent, taken) for sent, taken in json.loads(self._times.read_text())]
+
+    def end(self) -> None:
         for process in self._processes:
             process.send_signal(signal.SIGINT)
         for process in self._processes:
@@ -130,7 +136,6 @@ class _Relay:
                 process.kill()
                 process.wait()
         self._bench.destroy_publisher(self._publisher)
-        return [(sent, taken) for sent, taken in json.loads(self._times.read_text())]
 
 
 def _relay_alone(bench: _Bench, relay: _Relay) -> tuple[float, float]:
@@ -244,7 +249,8 @@ def measure(_blocks: int, _calls: int) -> dict[str, dict[str, float]]:
                 alone = _relay_alone(bench, relay)
                 robot, beside = _robot(bench, relay, directory)
             finally:
-                poses = relay.end()
+                relay.end()
+            poses = relay.times()
         finally:
             bench.destroy_node()
             rclpy.shutdown()

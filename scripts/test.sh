@@ -7,7 +7,7 @@
 cd "$(dirname "${BASH_SOURCE[0]}")/.." || exit
 . scripts/env.sh || exit
 failed=0 selected=$#
-run() { # pytest options...; of a selection, one of the two parts may have no tests (exit code 5)
+run() { # pytest options...; of a selection, a part may have no tests (exit code 5)
   local code=0
   python -m pytest "$@" || code=$?
   if [ "$code" -ne 0 ] && ! { [ "$code" -eq 5 ] && [ "$selected" -gt 0 ]; }; then failed=$code; fi

@@ -37,7 +37,7 @@ from snake_control.errors import NodeDiedError, NotReadyError, SnakeError
 from snake_control.experiment.series import Series
 from snake_control.experiment.summary import Run, summarise, write_summary
 from snake_control.experiment.table import format_summary
-from snake_control.nodes.process import leaving_the_graph
+from snake_control.nodes.process import end_soon
 from snake_control.nodes.recorder import FOLLOWING, STATUS_WORDS, Recorder
 from snake_control.nodes.topics import ENABLE, START, STOP, Service
 
@@ -268,9 +268,13 @@ class Demo:
         self.series.close()
         if self._executor is not None:
             self._executor.shutdown()
-            with leaving_the_graph():
-                self._node.destroy_node()
-                rclpy.try_shutdown()
+
+    def leave(self) -> None:
+        """Leave the graph; nothing else is left to do then."""
+        if self._executor is not None:
+            end_soon()
+            self._node.destroy_node()
+            rclpy.try_shutdown()
 
     def _call(
         self, node: str, service: Service, request: Any, timeout_s: float, checked: bool = True
@@ -354,6 +358,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             finally:
                 demo.processes.kill()
             _write_results(arguments, config, demo, outcome)
+    demo.leave()
     return outcome.exit_code
 
 

@@ -262,6 +262,10 @@ class ScpController:
         """Whether the SCPs' velocities depend on the head's: not those of (25), (27)."""
         return self._sub_tasks.follows_head
 
+    def prepare(self, posture: Posture) -> None:
+        """Work out in a posture what ``sub_tasks`` will ask of it."""
+        self._sub_tasks.prepare(posture)
+
     def sub_tasks(self, posture: Posture, w_dot: list[float]) -> Array:
         """Return the SCP velocities of (25), (27) for a velocity of the head (or its twist)."""
         return self._sub_tasks.velocities(posture, w_dot)

@@ -26,7 +26,9 @@ from snake_control.control.escape import Escape
 from snake_control.control.reference import Reference
 from snake_control.control.scp_controller import ControlResult, ScpController
 from snake_control.errors import SnakeError
+from snake_control.model.geometry import checked_posture
 from snake_control.model.posture import Posture
+from snake_control.model.structure import structure
 
 Array = NDArray[np.float64]
 
@@ -97,6 +99,7 @@ class Supervisor:
             ConfigError: a sub-task cannot be made.
         """
         self._robot = robot
+        self._structure = structure(robot)
         self._law = ScpController(robot, controller)
         self._config = supervisor
         self._period_s = period_s
@@ -133,7 +136,8 @@ class Supervisor:
         Args:
             phi: joint angles, (n-1,) [rad]; a step with others works out everything itself.
             w: pose of the head, (6,) [m, rad], if that is known as well; a step with another takes
-                over what the joints alone decide.
+                over what the joints alone decide. The posture in the result of a step with this one
+                is the one that was prepared, and serves further steps: it must not be changed.
 
         Raises:
             ModelError: not finite, or the wrong shape.
@@ -143,8 +147,7 @@ class Supervisor:
         posture, limits = self._known(phi)
         if w is not None:
             posture = posture.moved(w)
-        # For what it leaves in the posture.
-        self._law.sub_tasks(posture, self._still)
+        self._law.prepare(posture)
         self._prepared = posture, limits
 
     def _known(self, phi: Array) -> tuple[Posture, BarriersAt]:
@@ -152,7 +155,7 @@ class Supervisor:
         if self._prepared is not None and np.array_equal(self._prepared[0].g.q[6:], phi):
             return self._prepared
         on_floor = self._barriers.on_floor(phi)
-        return Posture.of(self._robot, on_floor), self._barriers.at(phi, on_floor)
+        return Posture.of(self._robot, on_floor), self._barriers.at(on_floor.q[6:], on_floor)
 
     def step(
         self, q: ArrayLike, q_dot: ArrayLike | None, reference: Reference, t: float
@@ -174,7 +177,8 @@ class Supervisor:
             plain = self._law.step(q, q_dot, reference, t)
             self._u = plain.u
             return SupervisedResult(**{f.name: getattr(plain, f.name) for f in _PLAIN})
-        phi = np.asarray(q, dtype=float)[6:]
+        q = checked_posture(self._structure, q)
+        phi = q[6:]
         known, at = self._known(phi)
         posture, error = self._law.look(q, reference, known)
         self._lift(at)

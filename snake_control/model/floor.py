@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from snake_control.config import RobotConfig
+from snake_control.errors import ModelError
 from snake_control.model.geometry import Geometry, checked_posture
 from snake_control.model.head_chain import HeadChain, head_chain
 from snake_control.model.rotation import rpy_from_rotation, rpy_rates
@@ -60,7 +61,10 @@ def geometry_on_floor(robot: RobotConfig, phi: ArrayLike) -> Geometry:
         ModelError: phi has the wrong shape, is not finite, or beyond +-1e6.
     """
     s = structure(robot)
-    angles = checked_posture(s, np.concatenate((np.zeros(6), phi)))[6:]
+    angles = np.asarray(phi, dtype=float)
+    if angles.shape != (s.n - 1,):
+        raise ModelError(f"phi has shape {angles.shape}; expected ({s.n - 1},) for {s.n} links")
+    angles = checked_posture(s, np.concatenate((np.zeros(6), angles)))[6:]
     chain = head_chain(s, angles[: s.n_h].tolist())
     w = chain_pose_on_floor(robot, chain, np.zeros(3))
     return Geometry(s, np.concatenate((w, angles)), chain)

@@ -30,7 +30,7 @@ from snake_control.config.yaml_file import read_text
 from snake_control.errors import SnakeError
 from snake_control.nodes import topics
 from snake_control.nodes.conversions import HEAD_FRAME
-from snake_control.nodes.process import EXIT_BAD_CONFIG, EXIT_FAILED, leaving_the_graph
+from snake_control.nodes.process import EXIT_BAD_CONFIG, EXIT_FAILED, end_soon
 from snake_control.trajectory.course_text import parse_course
 
 _SETTLE_S = 0.5
@@ -104,6 +104,10 @@ class _Client:
             flush=True,
         )
         return 0 if result.code == FollowHeadTrajectory.Result.NONE else EXIT_FAILED
+
+    def destroy(self) -> None:
+        """Take the client out of the graph, before its node."""
+        self._client.destroy()
 
     def _spin_until(
         self,
@@ -201,15 +205,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"head_trajectory: {error}", file=sys.stderr)
         return EXIT_BAD_CONFIG
     node = rclpy.create_node("head_trajectory")
+    client = _Client(node, interrupts)
     try:
-        return _Client(node, interrupts).follow(goal, given.wait)
+        return client.follow(goal, given.wait)
     except _GoalError as error:
         print(f"head_trajectory: {error}", file=sys.stderr)
         return EXIT_FAILED
     finally:
-        with leaving_the_graph():
-            node.destroy_node()
-            rclpy.try_shutdown()
+        end_soon()
+        client.destroy()
+        node.destroy_node()
+        rclpy.try_shutdown()
 
 
 if __name__ == "__main__":

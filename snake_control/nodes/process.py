@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import faulthandler
 import gc
+import os
 import signal
 import sys
 import threading
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from types import FrameType
 from typing import Protocol
 
@@ -33,7 +34,7 @@ THREAD_SWITCH_S = 5e-4
 _LOOK_UP_S = 0.1
 
 _LEAVING_S = 3.0
-"""How long a process may take to leave the graph; ros2 launch kills after 10 s, with less words."""
+"""How long a process may take to leave the graph; ros2 launch kills after 10 s, without a word."""
 
 _ENDING_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
@@ -49,19 +50,23 @@ class Runnable(Protocol):
         """Bring the hardware to rest and release it; ROS still works at this time."""
 
 
-@contextmanager
-def leaving_the_graph() -> Iterator[None]:
-    """End the process, with exit code 1, if what is done inside does not come to an end.
+def end_soon() -> None:
+    """End the process within 3 s, with exit code 1 and a traceback, unless it ends by itself.
 
-    For destroying nodes and shutting down, with nothing left to do after it that matters: when
-    many nodes leave at the same time, Fast DDS 2.14 can wait for ever in the destruction of a
+    To be called when nothing is left that matters but to destroy nodes and to return: when many
+    nodes leave at the same time, Fast DDS 2.14 can wait for ever in the destruction of a
     participant (a listener that is never free), at full load and with the interpreter's lock held.
     """
-    faulthandler.dump_traceback_later(_LEAVING_S, exit=True)
+    for stream in (sys.stdout, sys.stderr):
+        if stream is not None:
+            # Whoever read it may be gone.
+            with contextlib.suppress(OSError, ValueError):
+                stream.flush()
     try:
-        yield
-    finally:
-        faulthandler.cancel_dump_traceback_later()
+        file = os.dup(sys.__stderr__.fileno())  # type: ignore[union-attr]
+    except (AttributeError, OSError, ValueError):
+        file = os.open(os.devnull, os.O_WRONLY)
+    faulthandler.dump_traceback_later(_LEAVING_S, exit=True, file=file)
 
 
 def run(make_node: Callable[..., Node], kind: str, arguments: Sequence[str] | None = None) -> int:
@@ -100,6 +105,7 @@ def run(make_node: Callable[..., Node], kind: str, arguments: Sequence[str] | No
         print(f"configuration error: {error}", file=sys.stderr)
         return EXIT_BAD_CONFIG
     node: Node | None = None
+    executor: SingleThreadedExecutor | None = None
     try:
         node = make_node(
             parameter_overrides=[Parameter(name, value=value) for name, value in given.items()],
@@ -126,10 +132,14 @@ def run(make_node: Callable[..., Node], kind: str, arguments: Sequence[str] | No
     finally:
         if node is not None:
             node.close()  # type: ignore[attr-defined]
-        with leaving_the_graph():
-            if node is not None:
-                node.destroy_node()
-            rclpy.try_shutdown()
+        end_soon()
+        if node is not None:
+            node.destroy_node()
+        # A lifecycle node is in the graph for as long as anything refers to it.
+        node = executor = None
+        gc.unfreeze()
+        gc.collect()
+        rclpy.try_shutdown()
         # A terminal and a launch file may both send one; while Python itself ends, a second
         # signal would turn an orderly stop into a death by signal.
         for number in _ENDING_SIGNALS:

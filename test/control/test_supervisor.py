@@ -7,11 +7,12 @@ import dataclasses
 import numpy as np
 import pytest
 
-from snake_control.config import Config, SupervisorConfig, load
+from snake_control.config import Config, RobotConfig, SupervisorConfig, load
 from snake_control.control.barriers import Limit
 from snake_control.control.reference import Reference
 from snake_control.control.scp_controller import ScpController
 from snake_control.control.supervisor import HOLDING_AFTER_S, HOLDING_BELOW, Supervisor
+from snake_control.errors import ModelError
 from snake_control.experiment.cases import config_directory, load_case
 from snake_control.experiment.guided import GuidedRobot
 from snake_control.model.floor import head_pose_on_floor
@@ -19,6 +20,7 @@ from snake_control.trajectory.approach import Approach
 from snake_control.trajectory.hold import Hold
 from snake_control.trajectory.line import Line
 from support.experiments import LONG_ROBOT
+from support.robots import ROBOTS, random_q
 
 DT = 0.02
 
@@ -248,14 +250,85 @@ def test_thresholds_that_contradict_each_other_are_refused(
         SupervisorConfig(**given)
 
 
-def test_what_was_prepared_changes_nothing_and_is_not_used_elsewhere() -> None:
-    robot, prepared = GuidedRobot(load_case((), 3)), GuidedRobot(load_case((), 3))
-    reference = Reference(robot.state.w + np.array([0.02, 0, 0, 0, 0, 0.1]), np.zeros(6))
-    for i in range(40):
-        phi, w = prepared.state.phi, prepared.state.w
-        prepared._supervisor.prepare(phi if i % 3 else phi + 0.2)
+@pytest.mark.parametrize("robot", list(ROBOTS.values()), ids=list(ROBOTS))
+@pytest.mark.parametrize("rotation_error", ["rpy", "rotation_vector"])
+@pytest.mark.parametrize("scp_law", ["gradient", "projection"])
+def test_what_was_prepared_changes_nothing_and_is_not_used_elsewhere(
+    robot: RobotConfig, rotation_error: str, scp_law: str, config: Config
+) -> None:
+    own = dataclasses.replace(config.controller, rotation_error=rotation_error, scp_law=scp_law)
+    plain = Supervisor(robot, own, config.supervisor, DT)
+    prepared = Supervisor(robot, own, config.supervisor, DT)
+    rng = np.random.default_rng(0)
+    q = random_q(robot, 1)
+    for i in range(12):
+        before = q.copy()
+        if i % 4:
+            q = q + 0.01 * rng.normal(size=len(q))
+        w, phi = (q if i % 3 else before)[:6], (q if i % 5 else before)[6:]
+        prepared.prepare(phi)
         if i % 2:
-            prepared._supervisor.prepare(phi, w if i % 5 else w + 0.1)
-        a, b = robot.cycle(reference), prepared.cycle(reference)
-        np.testing.assert_array_equal(a.result.u, b.result.u)
-        assert a.result.bound == b.result.bound
+            prepared.prepare(phi, w)
+        reference = Reference(q[:6] + 0.01 * rng.normal(size=6), 0.01 * rng.normal(size=6))
+        a, b = (made.step(q, None, reference, DT * i) for made in (plain, prepared))
+        for name in ("u", "u_unlimited", "error", "phi_tilde_dot_d", "support_polygon"):
+            np.testing.assert_array_equal(getattr(a, name), getattr(b, name), err_msg=name)
+        for name in ("bound", "escaping", "d_min", "V_h", "V_b1", "damping", "singular_shape"):
+            assert getattr(a, name) == getattr(b, name), name
+
+
+def test_a_step_takes_the_posture_that_was_prepared_for_it(
+    config: Config, start: np.ndarray, table_1: Reference
+) -> None:
+    made = supervisor(config)
+    made.prepare(start[6:], start[:6])
+    ready = made.step(start, None, table_1, 0.0).posture
+    assert made.step(start, None, table_1, DT).posture is ready
+    moved = start + np.eye(len(start))[0]
+    other = made.step(moved, None, table_1, 2 * DT).posture
+    assert other is not ready
+    assert other.k.base is ready.k.base, "it depends on the joints alone"
+
+
+def test_sub_tasks_of_others_are_not_asked_before_the_step(
+    config: Config, start: np.ndarray, table_1: Reference, own_package
+) -> None:
+    own_package(
+        """
+        import numpy as np
+        from snake_control.control.sub_tasks.sub_task import SubTask
+
+        class Counting(SubTask):
+            asked = 0
+
+            def value(self, posture):
+                return 0.0
+
+            def gradient(self, posture):
+                Counting.asked += 1
+                return np.zeros_like(posture.g.q)
+        """
+    )
+    own = dataclasses.replace(
+        config.controller,
+        base_sub_tasks=(*config.controller.base_sub_tasks, "my_package.my_module:Counting"),
+        base_weights=(*config.controller.base_weights, 1.0),
+    )
+    made = Supervisor(config.robot, own, config.supervisor, DT)
+    from my_package.my_module import Counting  # type: ignore[import-not-found]
+
+    before = Counting.asked
+    made.prepare(start[6:], start[:6])
+    assert Counting.asked == before
+    made.step(start, None, table_1, 0.0)
+    assert Counting.asked > before
+
+
+@pytest.mark.parametrize("shape", [(), (16,), (18,), (1, 17)])
+def test_a_posture_of_another_shape_is_refused(
+    config: Config, table_1: Reference, shape: tuple[int, ...]
+) -> None:
+    with pytest.raises(ModelError, match="shape"):
+        supervisor(config).step(np.zeros(shape), None, table_1, 0.0)
+    with pytest.raises(ModelError, match="shape"):
+        supervisor(config).prepare(np.zeros(shape))

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from snake_control.config import ControllerConfig, RobotConfig
 from snake_control.control.sub_tasks.catalogue import make
+from snake_control.control.sub_tasks.guard import GuardedSubTask
 from snake_control.control.sub_tasks.sub_task import SubTask
 from snake_control.model.posture import Posture
 from snake_control.model.vector import sumprod
@@ -78,6 +79,19 @@ class Composition:
             by_base = _sum(self._base, _by_base, posture, s.n_b - 1)
             base = by_base.dot(k.base_scp_motion).tolist()
         return np.array(head + base)
+
+    def prepare(self, posture: Posture) -> None:
+        """Work out in a posture what ``velocities`` will ask of it, as far as that is known.
+
+        Sub-tasks of somebody else's are not asked: they may take their time.
+        """
+        for tasks, part in ((self._head, _by_head), (self._base, _by_base)):
+            for _, task in tasks:
+                if not isinstance(task, GuardedSubTask):
+                    part(task, posture)
+        if posture.k.s.m_h:
+            _ = posture.k.head_scp_motion
+        _ = posture.k.base
 
     def _projected(self, posture: Posture, w_dot: list[float]) -> Array:
         k = posture.k
