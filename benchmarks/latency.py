@@ -60,7 +60,7 @@ class _Bench(Node):
         self.steps: dict[int, ControllerState] = {}
         self.cycles: dict[int, BusState] = {}
         self.following = self.bus_active = False
-        self.text = ""
+        self.text = self.bus_text = ""
 
     def spin(self, until: Callable[[], object], timeout_s: float) -> bool:
         deadline = time.monotonic() + timeout_s
@@ -86,6 +86,7 @@ class _Bench(Node):
             self.steps[_ns(message.header.stamp)] = message
 
     def hear_cycle(self, message: BusState) -> None:
+        self.bus_text = message.text
         self.bus_active = message.state in (BusState.STATE_HOLDING, BusState.STATE_MOVING)
         # Of a command that serves two cycles the first counts.
         self.cycles.setdefault(_ns(message.command_stamp), message)
@@ -197,7 +198,7 @@ def _robot(bench: _Bench, relay: _Relay, directory: Path) -> tuple[_Times, tuple
             if kind == "scp_controller" and not bench.spin(lambda: bench.text, _START_S):
                 raise RuntimeError("the controller does not start")
             if kind == "bus_driver" and not bench.spin(lambda: bench.bus_active, _START_S):
-                raise RuntimeError("the driver does not start")
+                raise RuntimeError(f"the driver does not start: {bench.bus_text}")
         if not bench.spin(lambda: bench.following, _START_S):
             raise RuntimeError(f"the robot does not follow: {bench.text}")
         bench.spin_for(SETTLE_S)
