@@ -36,6 +36,7 @@ from snake_interfaces.msg import BusState, ControllerState
 from snake_control.cli.node_processes import NodeProcesses
 from snake_control.cli.ros_domain import own_domain
 from snake_control.nodes import topics
+from snake_control.nodes.transport import without_shared_memory
 
 POSES_HZ = 100.0
 COMMANDS_HZ = 50.0
@@ -241,8 +242,9 @@ def measure(_blocks: int, _calls: int) -> dict[str, dict[str, float]]:
     """Measure the relay alone, then robot and relay beside each other."""
     with tempfile.TemporaryDirectory(prefix="bench_") as name, own_domain():
         directory = Path(name)
-        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-        bench = _Bench()
+        with without_shared_memory():
+            rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+            bench = _Bench()
         try:
             relay = _Relay(bench, directory)
             try:

@@ -40,6 +40,7 @@ from snake_control.experiment.table import format_summary
 from snake_control.nodes.process import end_soon
 from snake_control.nodes.recorder import FOLLOWING, STATUS_WORDS, Recorder
 from snake_control.nodes.topics import ENABLE, START, STOP, Service
+from snake_control.nodes.transport import without_shared_memory
 
 _STOP_ORDER = (
     "scp_controller",
@@ -152,8 +153,9 @@ class Demo:
                 raise NotReadyError("the mock's port", _READY_TIMEOUT_S, f"no {self._port}")
             time.sleep(0.02)
         self._start("bus_driver")
-        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-        self._node = rclpy.create_node("demo", namespace=self._namespace)
+        with without_shared_memory():
+            rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+            self._node = rclpy.create_node("demo", namespace=self._namespace)
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self._node)
         self.recorder = Recorder(self._node, self.series)

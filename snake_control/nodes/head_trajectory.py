@@ -31,6 +31,7 @@ from snake_control.errors import SnakeError
 from snake_control.nodes import topics
 from snake_control.nodes.conversions import HEAD_FRAME
 from snake_control.nodes.process import EXIT_BAD_CONFIG, EXIT_FAILED, end_soon
+from snake_control.nodes.transport import without_shared_memory
 from snake_control.trajectory.course_text import parse_course
 
 _SETTLE_S = 0.5
@@ -200,11 +201,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     goal.header.frame_id = given.frame
     interrupts = _Interrupts()
     try:
-        rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
-    except (rclpy_implementation.RCLError, rclpy_implementation.UnknownROSArgsError) as error:
+        with without_shared_memory():
+            rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
+            node = rclpy.create_node("head_trajectory")
+    except (
+        SnakeError,
+        rclpy_implementation.RCLError,
+        rclpy_implementation.UnknownROSArgsError,
+    ) as error:
         print(f"head_trajectory: {error}", file=sys.stderr)
         return EXIT_BAD_CONFIG
-    node = rclpy.create_node("head_trajectory")
     client = _Client(node, interrupts)
     try:
         return client.follow(goal, given.wait)

@@ -9,9 +9,9 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from types import FrameType
-from typing import Protocol
+from typing import Any, Protocol
 
 import rclpy
 from rclpy.clock import Clock, ClockType
@@ -23,6 +23,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from snake_control.config import load, namespace_and_name, parameter_files, parameters_of_node
 from snake_control.errors import ConfigError, SnakeError
+from snake_control.nodes.transport import without_shared_memory
 
 EXIT_BAD_CONFIG = 2
 EXIT_FAILED = 1
@@ -94,10 +95,20 @@ def run(make_node: Callable[..., Node], kind: str, arguments: Sequence[str] | No
         namespace, name = namespace_and_name(arguments, kind)
         load(*parameter_files(arguments), namespace=namespace, names={kind: name})
         given = parameters_of_node(arguments, kind)
+        with without_shared_memory():
+            return _run(make_node, arguments, given, stop)
     except SnakeError as error:
         print(f"configuration error: {error}", file=sys.stderr)
         return EXIT_BAD_CONFIG
 
+
+def _run(
+    make_node: Callable[..., Node],
+    arguments: list[str],
+    given: Mapping[str, Any],
+    stop: threading.Event,
+) -> int:
+    """Do what ``run`` does once the files are known to be good."""
     try:
         # rclpy's own handlers would shut the context down before the node can close in order.
         rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)

@@ -28,6 +28,7 @@ from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.publisher import Publisher
 from rclpy.signals import SignalHandlerOptions
 
+from snake_control.nodes.transport import without_shared_memory
 from support.process import Process
 
 _ASK_AGAIN_S = 1.0
@@ -98,12 +99,13 @@ class Graph:
         os.environ.update(ours)
         try:
             self._context = rclpy.Context()
-            rclpy.init(
-                context=self._context,
-                domain_id=self.domain_id,
-                signal_handler_options=SignalHandlerOptions.NO,
-            )
-            self.node = rclpy.create_node("test_of_the_graph", context=self._context)
+            with without_shared_memory():
+                rclpy.init(
+                    context=self._context,
+                    domain_id=self.domain_id,
+                    signal_handler_options=SignalHandlerOptions.NO,
+                )
+                self.node = rclpy.create_node("test_of_the_graph", context=self._context)
         finally:
             for name, value in before.items():
                 if value is None:
