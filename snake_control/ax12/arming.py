@@ -32,7 +32,10 @@ _WATCHED = ct.TORQUE_LIMIT.end - _RAM
 _STILL_TICKS = 6
 _SETTLE_TRIES = 4
 _STEADY_READINGS, _STEADY_TRIES = 4, 16
-_UNSTEADY = "it does not stand still, or its readings jump"
+_UNSTEADY = (
+    "it does not stand still, or its readings jump, as they do beyond the end of its sensor (+-150 "
+    "degrees; turn it back by hand)"
+)
 
 
 @dataclasses.dataclass(frozen=True)

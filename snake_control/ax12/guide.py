@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 
-from snake_control.ax12.joint import JointSetup
+from snake_control.ax12.joint import WHEEL_MODE, JointSetup
 from snake_control.ax12.units import MAX_TICKS, ticks_to_rad
 
 LEAST_TICKS = 30
@@ -28,7 +28,8 @@ class Measured:
     Attributes:
         direction: +1 or -1.
         zero_offset: servo angle at joint angle 0 [rad].
-        lower, upper: ends of the joint's way [rad].
+        lower, upper: ends of the joint's way [rad], as far as loads (compliance margin and slope)
+            cannot move it past the end of the sensor.
         remarks: what is not as configured, or cannot be.
     """
 
@@ -62,7 +63,12 @@ def measure(joint: JointSetup, direction: int, straight: int, ends: tuple[int, i
         ends: positions at both ends, in any order.
     """
     offset = ticks_to_rad(straight)
-    angles = sorted(direction * (ticks_to_rad(end) - offset) for end in ends)
+    seen = ends
+    if joint.mode != WHEEL_MODE:
+        # The sensor's middle is 512, a half beyond the middle of its ticks.
+        first, last = joint.compliance_ticks + 1, MAX_TICKS - joint.compliance_ticks
+        seen = (min(max(ends[0], first), last), min(max(ends[1], first), last))
+    angles = sorted(direction * (ticks_to_rad(end) - offset) for end in seen)
     remarks = []
     if direction != joint.direction:
         remarks.append(f"servos.directions is {joint.direction:+d}, the joint turns {direction:+d}")

@@ -14,6 +14,7 @@ _T = TypeVar("_T")
 
 _DEGREE = math.pi / 180
 _SERVO_HALF_RANGE_RAD = 150 * _DEGREE
+_TICK_RAD = 300 * _DEGREE / 1023
 
 
 def per_joint(field: str, values: tuple[_T, ...], joints: int) -> tuple[_T, ...]:
@@ -86,7 +87,7 @@ class RobotConfig:
         high=1e3,
     )
     joint_limits_rad: tuple[float, ...] = parameter(
-        (2.6,),
+        (2.4,),
         "largest angle of each joint to both sides, or one for all; or lower and upper bound of "
         "each joint in turn (2 (n - 1) entries) [rad]",
         low=-100.0,
@@ -256,25 +257,32 @@ class ServosConfig:
     )
 
     def check_reach(self, robot: RobotConfig) -> None:
-        """Check that joint-mode servos can reach the whole range of their joints.
+        """Check that joint-mode servos can reach the whole range of their joints, under load.
 
         The controller knows a joint's range from the robot alone; a servo that ends before it
-        would stop a joint that the controller takes for free.
+        would stop a joint that the controller takes for free. And a load moves a joint away from
+        its goal, by the compliance margin and slope at most; one that it moves past the end of its
+        sensor is blind, which stops the robot until somebody turns it back by hand.
 
         Raises:
-            ConfigError: a range that goes beyond the servo's +-150 degrees.
+            ConfigError: a range that goes nearer to the servo's +-150 degrees than its compliance
+                is wide.
         """
         for joint in range(1, robot.links):
             if self.velocity_modes[joint - 1] != "joint":
                 continue
+            give = self.compliance_margin_ticks[joint - 1] + self.compliance_slope[joint - 1]
+            reach = _SERVO_HALF_RANGE_RAD - give * _TICK_RAD
             for bound in robot.joint_range(joint):
                 angle = self.directions[joint - 1] * bound + self.zero_offsets_rad[joint - 1]
-                if abs(angle) > _SERVO_HALF_RANGE_RAD:
+                if abs(angle) > reach:
                     raise ConfigError(
                         "robot.joint_limits_rad",
                         bound,
-                        f"joint {joint} would turn its servo to {angle:.3f} rad; an AX-12 in joint "
-                        f"mode reaches +-{_SERVO_HALF_RANGE_RAD:.3f}",
+                        f"joint {joint} would turn its servo to {angle:.3f} rad; allowed in joint "
+                        f"mode: +-{reach:.3f}, since beyond +-{_SERVO_HALF_RANGE_RAD:.3f} an AX-12 "
+                        f"is blind, and loads move it by up to {give} ticks (compliance margin and "
+                        "slope)",
                     )
 
     @staticmethod

@@ -1,3 +1,4 @@
+import dataclasses
 import math
 
 import pytest
@@ -32,6 +33,16 @@ def test_a_servo_mounted_the_other_way_round_and_askew_is_told():
         "servos.directions is +1, the joint turns -1",
         "servos.zero_offsets_rad is 0.000, straight is at 0.092 rad",
     )
+
+
+def test_a_range_leaves_room_for_what_loads_do():
+    found = measure(JOINT, 1, 512, (10, 1000))
+    give = JOINT.compliance_ticks
+    assert found.lower - give * TICK >= -math.radians(150)
+    assert found.upper + give * TICK <= math.radians(150)
+    assert found.upper - found.lower > (1023 - 2 * give - 2) * TICK
+    wheel = dataclasses.replace(JOINT, mode="wheel")
+    assert measure(wheel, 1, 512, (10, 1000)).lower == pytest.approx(-502 * TICK)
 
 
 def test_ends_beyond_the_sensor_and_a_shorter_way_are_told():

@@ -141,7 +141,7 @@ CASES = {
     ),
     # Postures.
     "angles of some joints": ("postures", {"up": [0.1, 0.2]}, "up", "give 11 entries"),
-    "posture beyond a range": ("postures", {"up": [0.1] * 10 + [-2.7]}, "up[10]", "joint 11, -2.6"),
+    "posture beyond a range": ("postures", {"up": [0.1] * 10 + [-2.7]}, "up[10]", "joint 11, -2.4"),
     "posture of texts": ("postures", {"up": ["high"]}, "up[0]", "give a number"),
     "posture that is built in": ("postures", {"flat": [0.1]}, "flat", "built in: all joints at 0"),
     "posture without a name": ("postures", {"": [0.1]}, "", "a letter first"),
@@ -152,6 +152,12 @@ CASES = {
         {"joint_limits_rad": [90.0]},
         "joint_limits_rad",
         "joint 1",
+    ),
+    "range without room for what loads do": (
+        "robot",
+        {"joint_limits_rad": [2.45]},
+        "joint_limits_rad",
+        "+-2.449, since beyond +-2.618 an AX-12 is blind, and loads move it by up to 33 ticks",
     ),
     "offset turns the range away": (
         "servos",
@@ -168,7 +174,7 @@ CASES = {
     "length as text": ("robot", {"half_length_m": "34 mm"}, "half_length_m", "number"),
     "links as decimal": ("robot", {"links": 12.0}, "links", "integer"),
     "masses of some links": ("robot", {"link_mass_kg": [0.1, 0.1]}, "link_mass_kg", "12"),
-    "limits of some joints": ("robot", {"joint_limits_rad": [2.6] * 5}, "joint_limits_rad", "11"),
+    "limits of some joints": ("robot", {"joint_limits_rad": [2.4] * 5}, "joint_limits_rad", "11"),
     "limit of zero": ("robot", {"joint_limits_rad": [0.0]}, "joint_limits_rad", "more than 0"),
     "start outside the range": (
         "robot",

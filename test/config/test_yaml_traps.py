@@ -53,9 +53,9 @@ def test_list_of_maps_is_refused(tmp_path):
 
 
 def test_one_number_stands_for_all(tmp_path):
-    config = load(shared(tmp_path, "robot: {link_mass_kg: 0.2, joint_limits_rad: 2.5}"))
+    config = load(shared(tmp_path, "robot: {link_mass_kg: 0.2, joint_limits_rad: 2.3}"))
     assert config.robot.link_mass_kg == (0.2,) * 12
-    assert config.robot.joint_range(11) == (-2.5, 2.5)
+    assert config.robot.joint_range(11) == (-2.3, 2.3)
 
 
 def test_zero_stands_for_none(tmp_path):

@@ -15,7 +15,7 @@ from snake_control.experiment.cases import config_directory
 ROBOT = RobotConfig()
 CONFIG = SupervisorConfig()
 PHI = np.array(ROBOT.start_joint_angles_rad)
-END = 2.6 - RANGE_MARGIN_RAD
+END = 2.4 - RANGE_MARGIN_RAD
 
 
 def motion(**joints: float) -> np.ndarray:

@@ -32,7 +32,7 @@ def test_whole_vector_is_scaled():
 
 def test_no_velocity_out_of_the_range_but_back_into_it():
     phi = np.zeros(11)
-    phi[2], phi[6] = 2.6, -2.6
+    phi[2], phi[6] = 2.4, -2.4
     found = LIMITS.apply(phi, np.ones(11))
     assert found.range_limited == (3,)
     assert found.u[2] == 0.0
@@ -45,12 +45,12 @@ def test_no_velocity_out_of_the_range_but_back_into_it():
 
 def test_joint_that_friction_holds_short_of_the_end_is_at_the_end():
     phi = np.zeros(11)
-    phi[10] = 2.583  # where a mock servo with a goal at 2.6 rad stands
+    phi[10] = 2.383  # where a mock servo with a goal at 2.4 rad stands
     assert LIMITS.apply(phi, np.ones(11)).range_limited == (11,)
 
 
 def test_asymmetric_range():
-    bounds = [-1.0, 2.0] + [-2.6, 2.6] * 10
+    bounds = [-1.0, 2.0] + [-2.4, 2.4] * 10
     robot = dataclasses.replace(PAPER, joint_limits_rad=tuple(bounds))
     phi = np.zeros(11)
     phi[0] = -1.0
@@ -68,7 +68,7 @@ def test_outward_joint_of_the_result_is_named():
     q = np.array(paper_states()[0]["q"])
     free = ScpController(PAPER, ControllerConfig(case=3)).step(q, None, still(q), 0.0)
     joint = int(np.argmax(np.abs(free.u)))
-    limits = [2.6] * 11
+    limits = [2.4] * 11
     limits[joint] = abs(float(q[6 + joint])) + 1e-6
     robot = dataclasses.replace(PAPER, joint_limits_rad=tuple(limits))
     q[6 + joint] = np.copysign(limits[joint], free.u[joint])

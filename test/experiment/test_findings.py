@@ -88,7 +88,7 @@ def test_limited_servos_have_the_expected_errors():
         facts = paper_facts(case, "limited")
         assert 1e3 * facts.error_at_end[0] == pytest.approx(x_mm, abs=1.5)
         assert facts.error_at_end[4] == pytest.approx(0.025, abs=0.002)
-        assert facts.largest_angle <= 2.6
+        assert facts.largest_angle <= 2.4
     assert paper_facts(2, "limited").largest_angle == pytest.approx(1.85, abs=0.1)
     assert paper_facts(3, "limited").largest_angle == pytest.approx(2.32, abs=0.1)
     assert paper_facts(3, "limited").d_min.min() == pytest.approx(0.011, abs=0.002)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 
 from snake_control.ax12 import control_table as ct
@@ -108,6 +109,11 @@ def _say(text: str) -> None:
     print(text, file=sys.stderr, flush=True)
 
 
+def _inwards(bound: float) -> float:
+    # Whole hundredths, and room for the offset that is rounded, too.
+    return math.floor(100.0 * bound - 0.1) / 100.0
+
+
 def _report(joints: tuple[JointSetup, ...], found: dict[str, Measured]) -> None:
     for name, m in found.items():
         for remark in m.remarks:
@@ -118,8 +124,10 @@ def _report(joints: tuple[JointSetup, ...], found: dict[str, Measured]) -> None:
         m = found.get(joint.name)
         directions.append(str(m.direction if m else joint.direction))
         offsets.append(f"{m.zero_offset if m else joint.zero_offset:.3f}")
-        lower, upper = (m.lower, m.upper) if m else (joint.lower, joint.upper)
-        limits += [f"{lower:.2f}", f"{upper:.2f}"]
+        if m is None:
+            limits += [f"{joint.lower:g}", f"{joint.upper:g}"]
+        else:
+            limits += [f"{-_inwards(-m.lower):.2f}", f"{_inwards(m.upper):.2f}"]
     print("    servos:")
     print(f"      directions: [{', '.join(directions)}]")
     print(f"      zero_offsets_rad: [{', '.join(offsets)}]")

@@ -175,10 +175,10 @@ def test_joint_range_acts_within_its_margin_alone():
         posture = Posture(PAPER, np.concatenate((np.zeros(6), phi)))
         return task.value(posture), task.gradient(posture)[13]
 
-    assert at(2.09) == (0.0, 0.0)
-    assert at(-2.09) == (0.0, 0.0)
-    assert at(2.35) == pytest.approx((-0.125, -1.0))
-    assert at(-2.6) == pytest.approx((-0.5, 2.0))
+    assert at(1.89) == (0.0, 0.0)
+    assert at(-1.89) == (0.0, 0.0)
+    assert at(2.15) == pytest.approx((-0.125, -1.0))
+    assert at(-2.4) == pytest.approx((-0.5, 2.0))
 
 
 @pytest.mark.parametrize(
