@@ -1,7 +1,8 @@
 """What the bus thread has to tell, told by another thread.
 
-Publishing and logging may block: a subscriber that is frozen or killed at the wrong moment holds
-what the middleware shares with it. The joints must go on being led, and stopped, meanwhile.
+Messages take time to be made and lines may block, of a terminal that nobody reads for instance. The
+joints must go on being led, and stopped, meanwhile. That is not enough against a middleware that
+blocks, since rclpy keeps the interpreter's lock while it publishes: see ``transport``.
 """
 
 from __future__ import annotations

@@ -9,9 +9,9 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from types import FrameType
-from typing import Any, Protocol
+from typing import Protocol
 
 import rclpy
 from rclpy.clock import Clock, ClockType
@@ -95,34 +95,32 @@ def run(make_node: Callable[..., Node], kind: str, arguments: Sequence[str] | No
         namespace, name = namespace_and_name(arguments, kind)
         load(*parameter_files(arguments), namespace=namespace, names={kind: name})
         given = parameters_of_node(arguments, kind)
-        with without_shared_memory():
-            return _run(make_node, arguments, given, stop)
     except SnakeError as error:
         print(f"configuration error: {error}", file=sys.stderr)
         return EXIT_BAD_CONFIG
 
-
-def _run(
-    make_node: Callable[..., Node],
-    arguments: list[str],
-    given: Mapping[str, Any],
-    stop: threading.Event,
-) -> int:
-    """Do what ``run`` does once the files are known to be good."""
+    surroundings = contextlib.ExitStack()
     try:
+        surroundings.enter_context(without_shared_memory())
         # rclpy's own handlers would shut the context down before the node can close in order.
         rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
-    except (rclpy_implementation.RCLError, rclpy_implementation.UnknownROSArgsError) as error:
+    except (
+        SnakeError,
+        rclpy_implementation.RCLError,
+        rclpy_implementation.UnknownROSArgsError,
+    ) as error:
+        surroundings.close()
         print(f"configuration error: {error}", file=sys.stderr)
         return EXIT_BAD_CONFIG
     node: Node | None = None
     executor: SingleThreadedExecutor | None = None
     try:
-        node = make_node(
-            parameter_overrides=[Parameter(name, value=value) for name, value in given.items()],
-            # That is how parameters that nobody knows come to light.
-            automatically_declare_parameters_from_overrides=True,
-        )
+        with surroundings:
+            node = make_node(
+                parameter_overrides=[Parameter(name, value=value) for name, value in given.items()],
+                # That is how parameters that nobody knows come to light.
+                automatically_declare_parameters_from_overrides=True,
+            )
         # What exists by now stays; searching it for garbage takes milliseconds at any moment.
         gc.collect()
         gc.freeze()

@@ -23,12 +23,14 @@ from snake_control.errors import ConfigError
 
 _BUILTIN = "FASTDDS_BUILTIN_TRANSPORTS"
 _PROFILES = "FASTRTPS_DEFAULT_PROFILES_FILE"
+_PROFILES_HERE = "DEFAULT_FASTRTPS_PROFILES.xml"
+_NO_PROFILES_HERE = "SKIP_DEFAULT_XML_FILE"
 _RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
 _ONLY_HERE = "ROS_LOCALHOST_ONLY"
 _PEERS = "ROS_STATIC_PEERS"
 _SERVER = "ROS_DISCOVERY_SERVER"
-_OWN_CHOICE = (_BUILTIN, _PROFILES, "FASTDDS_DEFAULT_PROFILES_FILE")
-_FILES_OF_ONES_OWN = ("DEFAULT_FASTRTPS_PROFILES.xml", "DEFAULT_FASTDDS_PROFILES.xml")
+# rcl takes whatever else is said as LOCALHOST.
+_OTHER_RANGES = ("", "OFF", "SUBNET", "SYSTEM_DEFAULT")
 
 _PARTICIPANTS_PER_HOST = 32
 _LOCALHOST = "127.0.0.1"
@@ -57,40 +59,59 @@ _PEER = "<locator><udpv4><address>{address}</address></udpv4></locator>"
 def without_shared_memory() -> Iterator[None]:
     """Have the participant that is made meanwhile, with its first node, talk through UDP alone.
 
-    It is left to other middlewares, and to users who chose transports or a profile themselves, what
-    they do. Who is discovered stays as the environment says.
+    It must be the first one of the process: Fast DDS reads profiles once. It is left to other
+    middlewares, and to users who chose transports or a profile themselves, what they do. Who is
+    discovered stays as the environment says.
 
     Raises:
-        ConfigError: a peer of ROS_STATIC_PEERS that has no address.
+        ConfigError: a peer of ROS_STATIC_PEERS that has no address, or no place for a file.
     """
-    if not get_rmw_implementation_identifier().startswith("rmw_fastrtps") or _chosen_by_user():
+    if not get_rmw_implementation_identifier().startswith("rmw_fastrtps"):
         yield
-    elif _on_localhost() and not os.environ.get(_SERVER):
-        # With this range rmw_fastrtps adds shared memory whatever else is said, so that the range
-        # is said by a profile instead.
-        addresses = [_LOCALHOST, *map(_address, _peers())]
-        text = _PROFILE.format(
-            participants=_PARTICIPANTS_PER_HOST,
-            peers="".join(_PEER.format(address=escape(address)) for address in addresses),
-        )
-        with tempfile.NamedTemporaryFile("w", suffix=".xml", prefix="fastdds_") as file:
-            file.write(text)
-            file.flush()
-            with _environment({_RANGE: "SYSTEM_DEFAULT", _ONLY_HERE: None, _PROFILES: file.name}):
+    elif _on_localhost():
+        if _profile_of_the_user() or os.environ.get(_SERVER):
+            yield
+        else:
+            with _profile_for_localhost():
                 yield
+    elif os.environ.get(_BUILTIN):
+        yield
     else:
         with _environment({_BUILTIN: "UDPv4"}):
             yield
 
 
-def _chosen_by_user() -> bool:
-    return any(map(os.environ.get, _OWN_CHOICE)) or any(
-        Path(name).exists() for name in _FILES_OF_ONES_OWN
+@contextmanager
+def _profile_for_localhost() -> Iterator[None]:
+    """Say by a profile what rmw_fastrtps sets for this range, but for shared memory.
+
+    It would add that whatever else is said.
+    """
+    addresses = [_LOCALHOST, *map(_address, _peers())]
+    text = _PROFILE.format(
+        participants=_PARTICIPANTS_PER_HOST,
+        peers="".join(_PEER.format(address=escape(address)) for address in addresses),
     )
+    try:
+        directory = tempfile.TemporaryDirectory(prefix="fastdds_", ignore_cleanup_errors=True)
+        file = Path(directory.name) / "profile.xml"
+        file.write_text(text)
+    except OSError as error:
+        place = tempfile.gettempdir() if error.filename is None else error.filename
+        raise ConfigError("TMPDIR", place, f"a directory to write to ({error})") from error
+    values = {_RANGE: "SYSTEM_DEFAULT", _ONLY_HERE: None, _PROFILES: str(file)}
+    with directory, _environment(values):
+        yield
+
+
+def _profile_of_the_user() -> bool:
+    if os.environ.get(_PROFILES):
+        return True
+    return os.environ.get(_NO_PROFILES_HERE) != "1" and Path(_PROFILES_HERE).exists()
 
 
 def _on_localhost() -> bool:
-    return os.environ.get(_RANGE) == "LOCALHOST" or os.environ.get(_ONLY_HERE) == "1"
+    return os.environ.get(_RANGE, "") not in _OTHER_RANGES or os.environ.get(_ONLY_HERE) == "1"
 
 
 def _peers() -> list[str]:
@@ -102,7 +123,7 @@ def _peers() -> list[str]:
 def _address(peer: str) -> str:
     try:
         return socket.gethostbyname(peer)
-    except OSError as error:
+    except (OSError, UnicodeError) as error:
         raise ConfigError(_PEERS, peer, f"no address is known of it ({error})") from error
 
 

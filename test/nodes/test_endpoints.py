@@ -13,6 +13,7 @@ from std_msgs.msg import String
 from snake_control.cli.ros_domain import own_domain
 from snake_control.nodes.endpoints import Endpoints
 from snake_control.nodes.topics import Topic
+from snake_control.nodes.transport import without_shared_memory
 
 QOS = QoSProfile(depth=1)
 
@@ -22,8 +23,9 @@ def test_names_are_remapped_once():
         context = Context()
         # Swapped: remapping the remapped name would lead back to the first one.
         swapped = ["--ros-args", "-r", "a:=b", "-r", "b:=a", "-r", "__ns:=/robot"]
-        rclpy.init(args=swapped, context=context)
-        node = rclpy.create_node("own", context=context)
+        with without_shared_memory():
+            rclpy.init(args=swapped, context=context)
+            node = rclpy.create_node("own", context=context)
         ends = Endpoints(node)
         heard = ends.subscription(Topic("a", String, QOS), print)
         said = ends.publisher(Topic("~/said", String, QOS))

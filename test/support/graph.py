@@ -258,6 +258,13 @@ class Graph:
         self.node.create_timer(period_s, callback)
         self._executor.wake()
 
+    def in_its_thread(self, call: Callable[[], _Result]) -> _Result:
+        """Call something in the thread of the test's node, and return what it returned."""
+        task = self._executor.create_task(call)
+        self._executor.wake()
+        self.wait_for(task.done, 10.0, "the thread of the test's node")
+        return task.result()
+
     def now_ns(self) -> int:
         """Time of the clock that stamps messages [ns]."""
         return self.node.get_clock().now().nanoseconds
