@@ -1,4 +1,8 @@
-"""Sends goals of one action and keeps the feedback."""
+"""Sends goals of one action and keeps the feedback.
+
+All of it in the thread of the test's node: rclpy's action client does not know the reply to a
+request that comes while another thread still sends it.
+"""
 
 from __future__ import annotations
 
@@ -27,8 +31,11 @@ class Goals:
 
     def send(self, **goal: Any) -> Sent:
         """Send a goal, which has to be accepted."""
-        sent = self._client.send_goal_async(
-            self._goal(**goal), feedback_callback=lambda m: self.feedback.append(m.feedback)
+        message = self._goal(**goal)
+        sent = self._graph.in_its_thread(
+            lambda: self._client.send_goal_async(
+                message, feedback_callback=lambda m: self.feedback.append(m.feedback)
+            )
         )
         self._graph.wait_for(sent.done, 20.0, "acceptance")
         handle = sent.result()
@@ -53,7 +60,7 @@ class Sent:
     def __init__(self, graph: Graph, handle: Any) -> None:
         self._graph = graph
         self._handle = handle
-        self._result = handle.get_result_async()
+        self._result = graph.in_its_thread(handle.get_result_async)
 
     @property
     def over(self) -> bool:
@@ -68,5 +75,5 @@ class Sent:
 
     def cancel(self) -> None:
         """Cancel it."""
-        canceled = self._handle.cancel_goal_async()
+        canceled = self._graph.in_its_thread(self._handle.cancel_goal_async)
         self._graph.wait_for(canceled.done, 10.0, "the answer to the cancellation")

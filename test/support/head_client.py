@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import time
 from typing import Any
 
 import numpy as np
@@ -43,6 +44,20 @@ class HeadClient:
     def result(self, timeout_s: float = 60.0) -> tuple[int, Any]:
         """Wait for the status and result of the goal sent last."""
         return self.goal.result(timeout_s)
+
+    def end(self, timeout_s: float) -> bool:
+        """Wait for the end of the goal sent last; cancel it after ``timeout_s``.
+
+        Returns:
+            Whether it ended by itself.
+        """
+        deadline = time.monotonic() + timeout_s
+        self.graph.wait_for(
+            lambda: self.goal.over or time.monotonic() > deadline, timeout_s + 10.0, "the result"
+        )
+        over = self.goal.over
+        self._goals.cancel_last()
+        return over
 
     def follow(self, poses: list = (), **more: Any) -> tuple[int, Any]:
         """Send a goal and wait for its end."""
