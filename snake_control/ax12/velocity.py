@@ -20,9 +20,11 @@ and holds it. Per servo there is a setpoint x_s, an angle:
   by hand does not snap back.
 * A stop must be short, but must not give the droop away. While the joint rests or creeps (below
   one unit), the droop x_s - joint is remembered (low pass). At fast motion (from four units) and
-  at the edge to rest, x_s is limited to the joint's extrapolated place + [0 .. droop], widened by
-  one cycle of travel and two ticks. Between one and four units only the wide limit applies, so
-  that velocities that dither about one unit do not lose the droop time and again.
+  at the edge from one unit and more to rest, x_s is limited to the joint's extrapolated place + [0
+  .. droop], widened by one cycle of travel and two ticks. Below four units, and at the edge from
+  creeping to rest, only the wide limit applies, so that velocities that dither about one unit or
+  about zero do not lose the droop time and again: a joint that came with its load, whose droop is
+  not known yet, would sink a bit at each edge.
 
 Limit: goals are whole ticks. A joint that creeps below one unit while it hangs on its compliance
 goes from tick to tick; its average is right over some seconds, not within each.
@@ -152,21 +154,20 @@ class JointModeVelocity:
         if slow and not stale:
             self._droop += (lead - self._droop) * min(1.0, dt / _DROOP_TIME_S)
             self._droop = min(max(self._droop, -self._compliance), self._compliance)
-        stopping = velocity == 0.0 and self.velocity != 0.0
+        stopping = velocity == 0.0 and abs(self.velocity) >= RAD_S_PER_SPEED_UNIT
         if stopping or speed >= _FAST_UNITS * RAD_S_PER_SPEED_UNIT:
             band = _BAND_TICKS * RAD_PER_TICK + abs(self.velocity) * self._limits.period
             low, high = min(0.0, self._droop) - band, max(0.0, self._droop) + band
-        elif velocity != 0.0:
+        elif velocity != 0.0 or self.velocity != 0.0:
             high = self._compliance + _BAND_TICKS * RAD_PER_TICK
             low = -high
         else:
             return
         setpoint = here + min(max(lead, low), high)
-        # Extrapolation must not carry it out of the range; only where the joint was found may be.
-        outermost = min(self._lower, self.setpoint, present.angle)
-        setpoint = max(setpoint, outermost)
-        outermost = max(self._upper, self.setpoint, present.angle)
-        self.setpoint = min(setpoint, outermost)
+        # Neither extrapolation nor a load that has pushed the joint out of its range may carry it
+        # out, too; only where the joint was found when torque came may be outside.
+        setpoint = max(setpoint, min(self._lower, self.setpoint))
+        self.setpoint = min(setpoint, max(self._upper, self.setpoint))
 
     def _hold(self) -> GoalAndSpeed:
         return self._send(self.setpoint)

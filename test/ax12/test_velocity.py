@@ -222,6 +222,37 @@ def test_a_joint_outside_its_range_is_held_there_and_let_in() -> None:
     assert drive.run(-0.5, 2.0)[-1] == pytest.approx(outside - 1.0, abs=0.05)
 
 
+@pytest.mark.parametrize("way", [1, -1])
+@pytest.mark.parametrize("load", [0.1, 0.3, 0.6])
+def test_a_load_carries_a_joint_at_its_end_no_farther_than_compliance_gives(
+    way: int, load: float
+) -> None:
+    """A joint goes out with its load, and its velocity dithers about zero there."""
+    drive = Drive(ServoModel(load=-way * load), limits=limits(lower_ticks=400, upper_ticks=600))
+    drive.run(way * 0.8, 2.0)
+    for _ in range(150):
+        drive.cycle(way * 0.1 * UNIT)
+        drive.cycle(-way * 0.1 * UNIT)
+        drive.cycle(0.0)
+    assert all(400 <= sent.goal_ticks <= 600 for sent in drive.history)
+    end = ticks_to_rad(600 if way > 0 else 400) + way * (2 + 32 * load) * RAD_PER_TICK
+    assert way * drive.servo.angle <= way * end
+
+
+@pytest.mark.parametrize("way", [1, -1])
+@pytest.mark.parametrize("load", [0.1, 0.3, 0.6])
+def test_a_joint_that_comes_with_its_load_sags_once_and_no_more(way: int, load: float) -> None:
+    drive = Drive(ServoModel(load=-way * load))
+    drive.run(way * 0.8, 1.0)
+    before = drive.servo.angle
+    for _ in range(150):
+        drive.cycle(way * 0.1 * UNIT)
+        drive.cycle(-way * 0.1 * UNIT)
+        drive.cycle(0.0)
+    sagged = way * (drive.servo.angle - before)
+    assert sagged <= (4 + 32 * load) * RAD_PER_TICK + 2 * 0.8 * PERIOD
+
+
 def test_speed_is_limited() -> None:
     drive = Drive(limits=limits(speed=0.3))
     begin = drive.run(2.0, 0.2)[-1]

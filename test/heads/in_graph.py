@@ -330,6 +330,8 @@ def holds(outcome: Outcome) -> bool:
 
 def _line(o: Outcome) -> str:
     what = "fell" if o.fell else "ok" if holds(o) else "NOT DONE"
+    if o.range_rad > 0.0:
+        what = f"BEYOND ITS RANGE by {o.range_rad:.4f} rad"
     return (
         f"{o.name:28} {what:9} {o.refusal or ''} took {o.took:.2f}  {1e3 * o.error_m:.2f} mm "
         f"{o.error_rad:.4f} rad  d_min {1e3 * o.d_min_m:.1f} mm  {', '.join(o.reasons)} {o.command}"
