@@ -24,6 +24,7 @@ from snake_interfaces.action import FollowHeadTrajectory, GoToPosture
 from snake_interfaces.msg import BusState, ControllerState, HeadReference
 from std_srvs.srv import Trigger
 
+from snake_control.ax12.units import RAD_PER_TICK
 from snake_control.control.reference import Reference
 from snake_control.nodes import topics
 from snake_control.nodes.conversions import pose_array, pose_message, reference_message, stamp_ns
@@ -322,19 +323,29 @@ def shortest(of_each_kind: int) -> list[int]:
     return sorted(itertools.chain.from_iterable(chosen), key=seconds.__getitem__)
 
 
+def give_rad() -> float:
+    """Return how far a load may push a joint beyond its range: by its compliance [rad]."""
+    servos = config().servos
+    margins, slopes = servos.compliance_margin_ticks, servos.compliance_slope
+    return RAD_PER_TICK * max(m + s for m, s in zip(margins, slopes, strict=True))
+
+
 def holds(outcome: Outcome) -> bool:
     """Return whether it went as it should."""
-    safe = not outcome.fell and outcome.range_rad <= 0.0 and outcome.speed_rad_s <= _SPEED_ROUNDING
+    safe = (
+        not outcome.fell
+        and outcome.range_rad <= give_rad()
+        and outcome.speed_rad_s <= _SPEED_ROUNDING
+    )
     return safe and (outcome.completed or not outcome.accepted)
 
 
 def _line(o: Outcome) -> str:
     what = "fell" if o.fell else "ok" if holds(o) else "NOT DONE"
-    if o.range_rad > 0.0:
-        what = f"BEYOND ITS RANGE by {o.range_rad:.4f} rad"
     return (
         f"{o.name:28} {what:9} {o.refusal or ''} took {o.took:.2f}  {1e3 * o.error_m:.2f} mm "
-        f"{o.error_rad:.4f} rad  d_min {1e3 * o.d_min_m:.1f} mm  {', '.join(o.reasons)} {o.command}"
+        f"{o.error_rad:.4f} rad  d_min {1e3 * o.d_min_m:.1f} mm  range {o.range_rad:+.3f} rad  "
+        f"{', '.join(o.reasons)}  {o.command}"
     )
 
 
