@@ -245,4 +245,4 @@ class DrivenJoint:
 
     def _present(self, now: float) -> Present:
         feedback = self._feedback
-        return Present(feedback.angle, feedback.rate, now - feedback.read_at)
+        return Present(feedback.angle, feedback.rate, now - feedback.read_at, feedback.load)

@@ -3,17 +3,24 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from typing import NamedTuple
 
 from snake_control.ax12.units import MAX_RAW, MAX_TICKS
 
 
 class Present(NamedTuple):
-    """A measured angle [rad], its rate [rad/s] and age [s]."""
+    """A measured angle [rad], its rate [rad/s] and age [s], and the output seen with it.
+
+    Attributes:
+        load: Present Load as a fraction of the largest output, counter-clockwise positive; NaN if
+            it is not known.
+    """
 
     angle: float
     rate: float
     age: float
+    load: float = math.nan
 
     def after(self, longest: float, fastest: float) -> float:
         """The angle extrapolated to the present time, by a limited time and speed only."""

@@ -26,6 +26,11 @@ and holds it. Per servo there is a setpoint x_s, an angle:
   about zero do not lose the droop time and again: a joint that came with its load, whose droop is
   not known yet, would sink a bit at each edge.
 
+* A joint that has moved with its load sinks when it holds, for its goal has to go to the other side
+  of it first. At the edge from one unit and more to creep or rest, x_s is put there at once, by
+  what Present Load says of a servo that brakes: its output, of which friction carries a part, so
+  that this is never too much.
+
 Limit: goals are whole ticks. A joint that creeps below one unit while it hangs on its compliance
 goes from tick to tick; its average is right over some seconds, not within each.
 
@@ -54,6 +59,7 @@ SEED_SPEED_RAW = 20
 
 _FAST_UNITS = 4.0
 _DROOP_TIME_S = 0.3
+_LOAD_TIME_S = 0.1
 _REST_TIME_S = 0.3
 _STALE_S, _STALE_PERIODS = 0.1, 2.5
 _BAND_TICKS = 2.0
@@ -79,7 +85,7 @@ class JointModeVelocity:
         self._upper = ticks_to_rad(limits.upper_ticks)
         self.velocity = self.expected = 0.0
         self._speed_raw = SEED_SPEED_RAW
-        self._droop = 0.0
+        self._droop = self._load = 0.0
         self._at_rest = 0.0  # [s]
         # At a low rate of the bus the newest reading is a period old.
         self._oldest = max(_STALE_S, _STALE_PERIODS * limits.period)
@@ -90,7 +96,7 @@ class JointModeVelocity:
         self._ramp.velocity = self.velocity = self.expected = 0.0
         self._units.reset()
         self._speed_raw = SEED_SPEED_RAW
-        self._droop = 0.0
+        self._droop = self._load = 0.0
         return self._hold()
 
     def stop(self, dt: float, present: Present) -> GoalAndSpeed:
@@ -119,6 +125,8 @@ class JointModeVelocity:
             velocity = self._ramp.velocity = 0.0
         if not stays:
             self._limit_lead(velocity, dt, present, stale)
+        if not stale:
+            self._keep_from_sinking(velocity, dt, present)
         self.velocity = velocity
         room = self._upper - present.angle if velocity > 0 else present.angle - self._lower
         self.expected = velocity if room > self._compliance + RAD_PER_TICK else 0.0
@@ -168,6 +176,24 @@ class JointModeVelocity:
         # out, too; only where the joint was found when torque came may be outside.
         setpoint = max(setpoint, min(self._lower, self.setpoint))
         self.setpoint = min(setpoint, max(self._upper, self.setpoint))
+
+    def _keep_from_sinking(self, velocity: float, dt: float, present: Present) -> None:
+        if math.isnan(present.load):
+            return
+        self._load += (present.load - self._load) * min(1.0, dt / _LOAD_TIME_S)
+        slows_down = abs(self.velocity) >= RAD_S_PER_SPEED_UNIT > abs(velocity)
+        brakes = present.load * self.velocity < 0.0 and self._load * self.velocity < 0.0
+        if not (slows_down and brakes):
+            return
+        # One reading that is wrong must not move the joint.
+        share = min(abs(present.load), abs(self._load))
+        droop = math.copysign(max(0.0, share * self._compliance - RAD_PER_TICK), present.load)
+        setpoint = present.after(self._oldest, abs(self.velocity) + RAD_S_PER_SPEED_UNIT) + droop
+        if droop * (setpoint - self.setpoint) > 0.0:
+            self.setpoint = min(
+                max(setpoint, min(self._lower, self.setpoint)), max(self._upper, self.setpoint)
+            )
+            self._droop = droop
 
     def _hold(self) -> GoalAndSpeed:
         return self._send(self.setpoint)

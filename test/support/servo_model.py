@@ -20,11 +20,18 @@ class ServoModel:
     """Attributes: ``angle`` [rad], ``rate`` [rad/s], ``load`` as fraction of the stall torque."""
 
     def __init__(
-        self, angle: float = 0.0, load: float = 0.0, slope_ticks: int = 32, margin_ticks: int = 1
+        self,
+        angle: float = 0.0,
+        load: float = 0.0,
+        slope_ticks: int = 32,
+        margin_ticks: int = 1,
+        load_known: bool = True,
     ) -> None:
         self.angle = angle
         self.rate = 0.0
         self.load = load
+        self.output = 0.0
+        self._load_known = load_known
         self._slope = slope_ticks * RAD_PER_TICK
         self._margin = margin_ticks * RAD_PER_TICK
         self._before = angle
@@ -40,11 +47,16 @@ class ServoModel:
             beyond = math.copysign(max(0.0, abs(distance) - self._margin), distance)
             output = min(max(beyond / self._slope, -1.0), 1.0)
             self.rate = NO_LOAD_RAD_S * (output - self.load)
+            held = self.rate
             if self.rate * output > 0:
                 self.rate = min(max(self.rate, -limit), limit)
+            # What the speed control leaves of it; a load in the joint's way brakes.
+            self.output = output + (self.rate - held) / NO_LOAD_RAD_S
             self.angle += self.rate * dt / STEPS_PER_CYCLE
 
     def measured(self, age: float) -> Present:
         """What the driver knows: whole ticks, at the end of the last cycle."""
         ticks = round(self.angle / RAD_PER_TICK)
-        return Present(ticks * RAD_PER_TICK, self.rate, age)
+        return Present(
+            ticks * RAD_PER_TICK, self.rate, age, self.output if self._load_known else math.nan
+        )
