@@ -27,7 +27,9 @@ SLOW_STALE_S = 3.0
 """Voltage and temperature that were not read for so long are not known any more."""
 
 _ALARMS_IN_ROW = 2
-_ASKED_IN_VAIN = 2
+_ASKED_IN_VAIN = 5
+"""So often, too: on a computer that pauses, replies are late and joints are asked seldom. A joint
+without fresh readings holds meanwhile."""
 
 
 @dataclasses.dataclass(frozen=True)
