@@ -25,7 +25,6 @@ and holds it. Per servo there is a setpoint x_s, an angle:
   creeping to rest, only the wide limit applies, so that velocities that dither about one unit or
   about zero do not lose the droop time and again: a joint that came with its load, whose droop is
   not known yet, would sink a bit at each edge.
-
 * A joint that has moved with its load sinks when it holds, for its goal has to go to the other side
   of it first. At the edge from one unit and more to creep or rest, x_s is put there at once, by
   what Present Load says of a servo that brakes: its output, of which friction carries a part, so
