@@ -32,6 +32,20 @@ class SupervisorConfig:
     d_min_stop_m: float = parameter(
         0.005, "no motion brings the margin below this [m]", low=0.0, high=10.0, run_time=True
     )
+    floor_warn_m: float = parameter(
+        0.006,
+        "below this height of a raised link above the floor the H-SCPs work to lift it [m]",
+        low=0.0,
+        high=10.0,
+        run_time=True,
+    )
+    floor_stop_m: float = parameter(
+        0.002,
+        "no motion brings a raised link nearer to the floor than this [m]",
+        low=0.0,
+        high=10.0,
+        run_time=True,
+    )
     nearness_warn: float = parameter(
         0.92,
         "above this nearness of a singular shape (Fig. 5) the SCPs work to get away",
@@ -111,6 +125,12 @@ class SupervisorConfig:
                 "supervisor.d_min_warn_m",
                 self.d_min_warn_m,
                 f"at least supervisor.d_min_stop_m = {self.d_min_stop_m:g}",
+            )
+        if self.floor_warn_m < self.floor_stop_m:
+            raise ConfigError(
+                "supervisor.floor_warn_m",
+                self.floor_warn_m,
+                f"at least supervisor.floor_stop_m = {self.floor_stop_m:g}",
             )
         if self.nearness_warn > self.nearness_stop:
             raise ConfigError(

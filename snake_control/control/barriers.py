@@ -7,9 +7,9 @@ form of Agrawal and Sreenath, Robotics: Science and Systems 2017). Where h is ne
 motion may make it worse.
 
 Ranges and speeds of the joints are linear in u and give bounds for it. The margin against falling,
-the nearness of a singular shape and the regularity of the head's posture are worked out at
-phi + u T, with the base level on the floor: exact also where the nearest edge of the support
-polygon changes, which a derivative is not.
+the height of the raised links above the floor, the nearness of a singular shape and the regularity
+of the head's posture are worked out at phi + u T, with the base level on the floor: exact also
+where the nearest edge of the support polygon changes, which a derivative is not.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from snake_control.config import RobotConfig, SupervisorConfig
 from snake_control.control.limits import RANGE_MARGIN_RAD
 from snake_control.model.floor import geometry_on_floor
+from snake_control.model.floor_clearance import floor_clearance
 from snake_control.model.geometry import Geometry
 from snake_control.model.head_block import HeadBlock
 from snake_control.model.singular_shape import singular_shape
@@ -39,6 +40,7 @@ class Limit(enum.Enum):
     JOINT_SPEED = "joint speed"
     JOINT_RANGE = "joint range"
     FALL = "falling"
+    FLOOR = "the floor"
     SINGULAR_BODY = "singular shape of the body"
     SINGULAR_HEAD = "singular posture of the head"
 
@@ -89,6 +91,7 @@ class Barriers:
         c = self._config
         return {
             Limit.FALL: c.d_min_warn_m - c.d_min_stop_m,
+            Limit.FLOOR: c.floor_warn_m - c.floor_stop_m,
             Limit.SINGULAR_BODY: c.nearness_stop - c.nearness_warn,
             Limit.SINGULAR_HEAD: c.regularity_warn - c.regularity_stop,
             Limit.JOINT_RANGE: c.range_warn_rad,
@@ -109,8 +112,9 @@ class Barriers:
     def margins(self, phi: Array) -> dict[Limit, float]:
         """Return what is left of the limits of the whole body, the base level on the floor.
 
-        d_min less its stop threshold [m]; its stop threshold less the nearness of a singular
-        shape; and the regularity of the head block less its stop threshold.
+        d_min less its stop threshold [m]; height of the lowest raised link above the floor less
+        its stop threshold [m]; its stop threshold less the nearness of a singular shape; and the
+        regularity of the head block less its stop threshold.
         """
         return self._margins(self.on_floor(phi))
 
@@ -120,6 +124,7 @@ class Barriers:
         if c.nearness_stop < 1.0:
             margins[Limit.SINGULAR_BODY] = c.nearness_stop - singular_shape(g).nearness
         if not self._robot.planar:
+            margins[Limit.FLOOR] = floor_clearance(g).height - c.floor_stop_m
             margins[Limit.SINGULAR_HEAD] = HeadBlock(g).regularity - c.regularity_stop
         return margins
 

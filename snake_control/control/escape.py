@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from snake_control.config import RobotConfig, SupervisorConfig
 from snake_control.control.barriers import Barriers, BarriersAt, Limit
+from snake_control.model.floor_clearance import floor_clearance, floor_clearance_by_head
 from snake_control.model.posture import Posture
 from snake_control.model.vector import sumprod
 from snake_control.model.wheel_axes import axis_spread
@@ -77,6 +78,9 @@ class Escape:
         n_h = posture.k.s.n_h
         if limit is Limit.FALL:
             return posture.support.gradient[6 : 6 + n_h], posture.support.by_base
+        if limit is Limit.FLOOR:
+            by_head = floor_clearance_by_head(posture.g, floor_clearance(posture.g))
+            return np.array(by_head), np.zeros(len(posture.g.q) - 6 - n_h)
         if limit is Limit.SINGULAR_HEAD:
             return np.array(posture.head_determinant_by_head), np.zeros(len(posture.g.q) - 6 - n_h)
         if limit is Limit.SINGULAR_BODY:

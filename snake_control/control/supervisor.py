@@ -42,6 +42,7 @@ HOLDING_AFTER_S = 0.5
 SUB_TASK_SHARE = 0.5
 """Share of the joints' speed limits that the sub-tasks may use with the head at rest."""
 
+_NEVER_LIFTED = (Limit.FALL, Limit.FLOOR)
 _CALMEST = 0.01
 _REGAINED = 0.5
 _PLAIN = dataclasses.fields(ControlResult)
@@ -250,7 +251,7 @@ class Supervisor:
         near: set[Limit] = {
             limit
             for limit, margin in at.margins.items()
-            if limit is not Limit.FALL and margin < _REGAINED * widths[limit]
+            if limit not in _NEVER_LIFTED and margin < _REGAINED * widths[limit]
         }
         self._lifted = near if self._begins else self._lifted & near
         self._begins = False

@@ -21,13 +21,15 @@ class HeadChain(NamedTuple):
         twists: how the base frame moves per velocity of joint i, n_h twists; the angular velocity
             of each is the axis of the joint.
         centers: centres of links 1 .. n_h [m].
+        frames: forward, left and up of links 1 .. n_h.
         tip: front end of link 1 [m].
-        frame: forward, left and up of link 1.
+        frame: forward, left and up of link 1, or of the base where there is no head part.
     """
 
     pivots: list[Vector]
     twists: list[Twist]
     centers: list[Vector]
+    frames: list[Rows]
     tip: Vector
     frame: Rows
 
@@ -39,7 +41,7 @@ def head_chain(s: Structure, angles: list[float]) -> HeadChain:
     x, y, z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
     point = (0.0, 0.0, 0.0)
     twists: list[Twist] = []
-    pivots, centers = [], []
+    pivots, centers, frames = [], [], []
     for joint in range(s.n_h - 1, -1, -1):
         c, si = math.cos(angles[joint]), math.sin(angles[joint])
         pivots.append(point)
@@ -52,8 +54,9 @@ def head_chain(s: Structure, angles: list[float]) -> HeadChain:
             x, y = combine(c, x, -si, y), combine(c, y, si, x)
         center = along(point, half, x)
         centers.append(center)
+        frames.append((x, y, z))
         point = along(center, half, x)
-    return HeadChain(pivots[::-1], twists[::-1], centers[::-1], point, (x, y, z))
+    return HeadChain(pivots[::-1], twists[::-1], centers[::-1], frames[::-1], point, (x, y, z))
 
 
 def base_rows(frame: Rows, roll: float, pitch: float, yaw: float) -> tuple[Rows, Vector]:

@@ -13,6 +13,7 @@ from snake_interfaces.msg import ControllerState, JointVelocityCommand
 from snake_control.config import ControllerConfig, RobotConfig
 from snake_control.control.barriers import Bound, Limit
 from snake_control.control.supervisor import SupervisedResult
+from snake_control.model.floor_clearance import floor_clearance
 from snake_control.model.rotation import wrap
 
 Array = NDArray[np.float64]
@@ -79,10 +80,14 @@ class Step:
         return Step(stamp_ns, np.full(robot.joints, math.nan), controlled=robot.controlled)
 
 
+_IMPOSSIBLE_M = 0.02
+"""Deeper in the floor than this no droop and no rounding puts a link."""
+
 REASON_OF_LIMIT = {
     Limit.JOINT_SPEED: ControllerState.REASON_JOINT_SPEED,
     Limit.JOINT_RANGE: ControllerState.REASON_JOINT_RANGE,
     Limit.FALL: ControllerState.REASON_FALL,
+    Limit.FLOOR: ControllerState.REASON_FLOOR,
     Limit.SINGULAR_BODY: ControllerState.REASON_SINGULAR_BODY,
     Limit.SINGULAR_HEAD: ControllerState.REASON_SINGULAR_HEAD,
 }
@@ -134,6 +139,15 @@ def _slowed(result: SupervisedResult, bound: Bound, robot: RobotConfig) -> str:
 def _near(limit: Limit, result: SupervisedResult) -> str:
     if limit is Limit.FALL:
         return f"falling (d_min {1e3 * result.d_min:.1f} mm)"
+    if limit is Limit.FLOOR:
+        lowest = floor_clearance(result.posture.g)
+        height_mm = 1e3 * lowest.height
+        if lowest.height < -_IMPOSSIBLE_M:
+            return (
+                f"the floor (by the joint angles link {lowest.link} is {-height_mm:.0f} mm in it: "
+                "check directions, zeros and order of the head's joints)"
+            )
+        return f"the floor (link {lowest.link} {height_mm:.1f} mm above it)"
     if limit is Limit.SINGULAR_BODY:
         shape = result.singular_shape
         return f"singular shape of the body ({shape.kind}, nearness {shape.nearness:.3f})"

@@ -129,3 +129,22 @@ def test_a_planar_snake_has_no_head_to_be_singular() -> None:
     planar = load(config_directory() / "planar_snake.yaml").robot
     margins = Barriers(planar, CONFIG).at(np.array(planar.start_joint_angles_rad)).margins
     assert set(margins) == {Limit.FALL, Limit.SINGULAR_BODY}
+
+
+def test_a_head_that_is_lowered_nears_the_floor_ever_more_slowly() -> None:
+    barriers = Barriers(ROBOT, CONFIG)
+    phi = PHI.copy()
+    phi[:5] = [0.2, 0.3, -1.0, -0.3, 0.8]
+    lowering = motion(joint_5=-1.0)
+    while barriers.margins(phi + 0.001 * lowering)[Limit.FLOOR] > 0.003:
+        phi += 0.001 * lowering
+    at = barriers.at(phi)
+    left = at.margins[Limit.FLOOR]
+    assert 0.0 < left < CONFIG.floor_warn_m - CONFIG.floor_stop_m
+    share, bound = at.largest_share(np.zeros(11), lowering)
+    assert 0.0 < share < 0.5
+    assert bound is not None
+    assert bound.limit is Limit.FLOOR
+    ahead = barriers.margins(phi + CONFIG.horizon_s * share * lowering)[Limit.FLOOR]
+    assert 0.6 * left <= ahead <= 0.7 * left
+    assert at.allows(-lowering)

@@ -16,6 +16,7 @@ from snake_control.control.supervisor import HOLDING_AFTER_S, HOLDING_BELOW, Sup
 from snake_control.errors import ModelError
 from snake_control.experiment.cases import config_directory, load_case
 from snake_control.experiment.guided import GuidedRobot
+from snake_control.model.bodies import Bodies
 from snake_control.model.floor import head_pose_on_floor
 from snake_control.trajectory.approach import Approach
 from snake_control.trajectory.hold import Hold
@@ -179,6 +180,31 @@ def test_it_holds_and_says_so_and_goes_on_at_once_when_led_away(config: Config) 
     assert not seen[-1].result.holding  # type: ignore[union-attr]
 
 
+def test_the_head_is_not_led_into_the_floor(config: Config) -> None:
+    """The posture stands well: nothing but the floor is in the way of a head that is lowered."""
+    phi = np.array(config.robot.start_joint_angles_rad)
+    phi[:5] = [0.2, 0.3, -1.0, -0.3, 0.8]
+    heights = {}
+    for name, limits in {"limits": {}, "none": {"enabled": False}}.items():
+        own = dataclasses.replace(config.supervisor, **limits)  # type: ignore[arg-type]
+        robot = GuidedRobot(dataclasses.replace(config, supervisor=own), None, phi)
+        down = Line(robot.state.w, (0.0, 0.0, -0.03, 0.0, 0.0, 0.0), 0.0)
+        seen = list(robot.follow(down.sample, 6.0, 8.0))
+        heights[name] = [Bodies(config.robot, s.state.phi).ground_clearance for s in seen]
+        if name == "limits":
+            last = seen[-1].result
+            assert last is not None
+            assert last.holding
+            assert last.bound is not None
+            assert last.bound.limit is Limit.FLOOR
+            top = robot.state.w[2]
+            up = Line(robot.state.w, (0.0, 0.0, 0.02, 0.0, 0.0, 0.0), 0.0)
+            list(robot.follow(up.sample, 2.0, 4.0))
+            assert robot.state.w[2] > top + 0.02
+    assert min(heights["limits"]) > config.supervisor.floor_stop_m - 1e-4
+    assert min(heights["none"]) < 0.0
+
+
 def test_a_motion_that_begins_in_a_singular_posture_may_lead_out_by_any_way(
     config: Config,
 ) -> None:
@@ -239,6 +265,7 @@ def test_a_gradient_without_bounds_leaves_the_head_its_joint_speeds(config: Conf
     ("given", "field"),
     [
         ({"d_min_warn_m": 0.001}, "supervisor.d_min_warn_m"),
+        ({"floor_warn_m": 0.001}, "supervisor.floor_warn_m"),
         ({"nearness_warn": 0.99}, "supervisor.nearness_warn"),
         ({"regularity_warn": 0.01}, "supervisor.regularity_warn"),
         ({"approach_rate_per_s": 20.0}, "supervisor.approach_rate_per_s"),

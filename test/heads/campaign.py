@@ -28,6 +28,7 @@ from snake_control.control.posture_way import PostureWays
 from snake_control.experiment.cases import load_case
 from snake_control.experiment.guided import GuidedRobot, GuidedSample, limited
 from snake_control.experiment.rehearsal import rehearse
+from snake_control.model.bodies import Bodies
 from snake_control.trajectory.approach import Approach
 from snake_control.trajectory.hold import Hold
 from support.head_trajectories import feasible, hostile
@@ -58,6 +59,7 @@ class Outcome:
         error_m, error_rad: median error after the transient, or at the end.
         range_rad, speed_rad_s: how far joints were beyond their ranges and speed limits, at most.
         d_min_m: the smallest.
+        floor_m: the least height of a body of the head part above the floor.
         reasons: limits that slowed it or that the robot had to get away from.
         command: what had to be called before a feasible reference was tracked again, if anything.
     """
@@ -74,6 +76,7 @@ class Outcome:
     range_rad: float
     speed_rad_s: float
     d_min_m: float
+    floor_m: float
     reasons: tuple[str, ...]
     command: str = ""
 
@@ -220,6 +223,7 @@ def _outcome(
         range_rad=float(beyond),
         speed_rad_s=float(too_fast),
         d_min_m=min([s.state.d_min for s in seen] + [robot.state.d_min]),
+        floor_m=min(Bodies(r, joints).ground_clearance for joints in phi),
         reasons=tuple(reasons),
         **more,  # type: ignore[arg-type]
     )
@@ -230,8 +234,9 @@ def table(title: str, outcomes: Sequence[Outcome], took: str) -> str:
     lines = [
         f"## {title}",
         "",
-        f"| trajectory | servos | result | {took} | error [mm] | [rad] | d_min [mm] | limits |",
-        "|---|---|---|---|---|---|---|---|",
+        f"| trajectory | servos | result | {took} | error [mm] | [rad] | d_min [mm] "
+        "| above the floor [mm] | limits |",
+        "|---|---|---|---|---|---|---|---|---|",
     ]
     for o in outcomes:
         result = "fell" if o.fell else "ok" if o.completed else "not done"
@@ -239,8 +244,8 @@ def table(title: str, outcomes: Sequence[Outcome], took: str) -> str:
             result = f"refused ({o.refusal})"
         lines.append(
             f"| {o.name} | {o.servos} | {result} | {o.took:.2f} | {1e3 * o.error_m:.2f} | "
-            f"{o.error_rad:.4f} | {1e3 * o.d_min_m:.1f} | {', '.join(o.reasons)}"
-            f"{' (' + o.command + ')' if o.command else ''} |"
+            f"{o.error_rad:.4f} | {1e3 * o.d_min_m:.1f} | {1e3 * o.floor_m:.1f} | "
+            f"{', '.join(o.reasons)}{' (' + o.command + ')' if o.command else ''} |"
         )
     return "\n".join(lines) + "\n"
 
@@ -259,6 +264,7 @@ def summary(feasible: Sequence[Outcome], hostile: Sequence[Outcome]) -> dict[str
         "tracked_again": sum(o.completed for o in hostile),
         "of_these_after_a_command": sum(o.completed and bool(o.command) for o in hostile),
         "fell": sum(o.fell for o in every),
+        "least_above_floor_mm": 1e3 * min((o.floor_m for o in every), default=math.nan),
         "beyond_range_rad": max((o.range_rad for o in every), default=math.nan),
         "beyond_speed_rad_s": max((o.speed_rad_s for o in every), default=math.nan),
     }
@@ -305,6 +311,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             print(f"{outcome.name}: {_words(outcome)}")
     print(f"written to {given.out / 'heads.md'}")
     safe = not figures["fell"] and outcomes and max(o.range_rad for o in outcomes) <= 0.0
+    safe = safe and min(o.floor_m for o in outcomes) >= 0.0
     return 0 if safe else 1
 
 

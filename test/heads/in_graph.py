@@ -26,6 +26,7 @@ from std_srvs.srv import Trigger
 
 from snake_control.ax12.units import RAD_PER_TICK
 from snake_control.control.reference import Reference
+from snake_control.model.bodies import Bodies
 from snake_control.nodes import topics
 from snake_control.nodes.conversions import pose_array, pose_message, reference_message, stamp_ns
 from support.action_client import Goals
@@ -251,6 +252,7 @@ class Campaign:
             range_rad=float(np.maximum(phi - bounds[:, 1], bounds[:, 0] - phi).max()),
             speed_rad_s=float((np.abs(u) - np.array(r.joint_speed_limits_rad_s)).max()),
             d_min_m=min(m.d_min for m in truth),
+            floor_m=min(Bodies(r, joints).ground_clearance for joints in phi),
             reasons=tuple(reasons),
             **more,  # type: ignore[arg-type]
         )
@@ -344,7 +346,8 @@ def _line(o: Outcome) -> str:
     what = "fell" if o.fell else "ok" if holds(o) else "NOT DONE"
     return (
         f"{o.name:28} {what:9} {o.refusal or ''} took {o.took:.2f}  {1e3 * o.error_m:.2f} mm "
-        f"{o.error_rad:.4f} rad  d_min {1e3 * o.d_min_m:.1f} mm  range {o.range_rad:+.3f} rad  "
+        f"{o.error_rad:.4f} rad  d_min {1e3 * o.d_min_m:.1f} mm  "
+        f"above floor {1e3 * o.floor_m:.1f} mm  range {o.range_rad:+.3f} rad  "
         f"{', '.join(o.reasons)}  {o.command}"
     )
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from heads.campaign import try_feasible, try_hostile
+from heads.campaign import config, try_feasible, try_hostile
 
 from support.head_trajectories import HOSTILE_KINDS, feasible, hostile
 
@@ -20,14 +20,20 @@ def test_what_the_robot_can_do_is_accepted_and_done(number: int) -> None:
     assert outcome.error_rad < 0.01
 
 
+LED_TO_THE_FLOOR = 37
 LEFT_WITH_A_SINGULAR_HEAD = 92
 HELPED_BY_A_POSTURE = 80
 
 
 @pytest.mark.parametrize(
     "number",
-    [*range(len(HOSTILE_KINDS)), LEFT_WITH_A_SINGULAR_HEAD, HELPED_BY_A_POSTURE],
-    ids=[*HOSTILE_KINDS, "left_with_a_singular_head", "helped_by_a_posture"],
+    [
+        *range(len(HOSTILE_KINDS)),
+        LED_TO_THE_FLOOR,
+        LEFT_WITH_A_SINGULAR_HEAD,
+        HELPED_BY_A_POSTURE,
+    ],
+    ids=[*HOSTILE_KINDS, "led_to_the_floor", "left_with_a_singular_head", "helped_by_a_posture"],
 )
 def test_what_it_must_not_do_is_ridden_out(number: int) -> None:
     outcome = try_hostile(number)
@@ -35,6 +41,8 @@ def test_what_it_must_not_do_is_ridden_out(number: int) -> None:
     assert outcome.d_min_m > 0.0
     assert outcome.range_rad <= 0.0
     assert outcome.speed_rad_s <= 1e-9
+    assert outcome.floor_m > config().supervisor.floor_stop_m - 1e-4
+    assert ("the floor" in outcome.reasons) == (number == LED_TO_THE_FLOOR)
     assert outcome.completed, f"tracked again after {outcome.took:.1f} s"
     assert bool(outcome.command) == (number == HELPED_BY_A_POSTURE)
 
