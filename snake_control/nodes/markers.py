@@ -48,6 +48,7 @@ _REFERENCE = ColorRGBA(r=0.70, g=0.30, b=0.75, a=1.0)
 _GOOD = ColorRGBA(r=0.30, g=0.65, b=0.30, a=1.0)
 _NEAR = ColorRGBA(r=0.95, g=0.75, b=0.10, a=1.0)
 _BAD = ColorRGBA(r=0.85, g=0.20, b=0.15, a=1.0)
+_OF_HEAD = {ControllerState.REASON_SINGULAR_HEAD, ControllerState.REASON_FLOOR}
 
 _LIFETIME = Duration(seconds=0.5).to_msg()
 # A wheel's axis is y, a cylinder's z.
@@ -145,12 +146,12 @@ class RobotMarkers:
         rotations = Rotation.from_quat(quaternions)
         ahead = rotations.apply([1.0, 0.0, 0.0])
         centers = origins - robot.half_length_m * ahead
-        head = ControllerState.REASON_SINGULAR_HEAD in step.reasons
+        head = not _OF_HEAD.isdisjoint(step.reasons)
         base = ControllerState.REASON_SINGULAR_BODY in step.reasons
         for i, marker in enumerate(self._links):
             _place(marker, centers[i], quaternions[i])
-            singular, color = (head, _HEAD) if i < robot.head_links else (base, _BASE)
-            marker.color = _NEAR if singular else color
+            near, color = (head, _HEAD) if i < robot.head_links else (base, _BASE)
+            marker.color = _NEAR if near else color
         if self._wheels:
             wheeled = [link - 1 for link in robot.wheeled_links]
             sides = robot.wheel_offset_m * rotations[wheeled].apply([0.0, 1.0, 0.0])

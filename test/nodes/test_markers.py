@@ -141,8 +141,9 @@ def test_limits_that_bite_are_seen_where_they_bite():
     assert rgb(found["support_polygon", 0]) == rgb(found["status", 0]) == AMBER
     assert {rgb(found["links", link]) for link in range(6, 13)} == {AMBER}
     assert AMBER not in {rgb(found["links", link]) for link in range(1, 6)}
-    head = dataclasses.replace(limited, reasons=(ControllerState.REASON_SINGULAR_HEAD,))
-    assert rgb(drawn(PAPER, q, step=head)["links", 1]) == AMBER
+    for reason in (ControllerState.REASON_SINGULAR_HEAD, ControllerState.REASON_FLOOR):
+        head = dataclasses.replace(limited, reasons=(reason,))
+        assert rgb(drawn(PAPER, q, step=head)["links", 1]) == AMBER
 
 
 def test_a_robot_that_tips_stands_on_red():
