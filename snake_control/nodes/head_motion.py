@@ -11,8 +11,7 @@ import dataclasses
 import math
 import threading
 from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor
-from typing import Protocol
+from concurrent.futures import Future
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,16 +19,25 @@ from rclpy.node import Node
 from rclpy.task import Future as RosFuture
 from snake_interfaces.msg import ControllerState, HeadTrajectoryStatus
 
-from snake_control.config import Config
+from snake_control.config import TrajectoryGeneratorConfig
 from snake_control.control.reference import Reference
 from snake_control.control.supervisor import NO_ANSWER
 from snake_control.errors import SnakeError
-from snake_control.experiment.rehearsal import Rehearsal, rehearse
+from snake_control.experiment.rehearsal import Rehearsal
 from snake_control.model.rotation import wrap
 from snake_control.nodes import topics
 from snake_control.nodes.conversions import header
 from snake_control.nodes.endpoints import Endpoints
-from snake_control.trajectory.head_trajectory import HeadTrajectory
+from snake_control.nodes.rehearsals import (
+    INPUT_WAIT_S,
+    NO_HEAD,
+    Movable,
+    Rehearsals,
+    Surroundings,
+    in_words,
+    wait_for_inputs,
+    what_is_missing,
+)
 from snake_control.trajectory.plan import Course, Plan
 from snake_control.trajectory.segments import line_to
 from snake_control.trajectory.sequence import Outcome, ReferenceSequence
@@ -50,26 +58,6 @@ _STOPS = (
     ControllerState.STATUS_RESHAPING,
 )
 _REFUSALS = (Status.INVALID, Status.NO_HEAD, Status.UNREACHABLE)
-_REHEARSAL_HZ = 25.0
-_INPUT_WAIT_S = 1.0
-"""How long a request waits for head pose and joint states that have just gone stale."""
-
-
-@dataclasses.dataclass(frozen=True)
-class Surroundings:
-    """What the node knows at one moment.
-
-    Attributes:
-        now: time of the steady clock [s].
-        head: w of the head, (6,); ``None`` if it is not known.
-        phi: joint angles, (n-1,); ``None`` if they are not known.
-        controller: its newest state, if it is heard.
-    """
-
-    now: float
-    head: Array | None
-    phi: Array | None
-    controller: ControllerState | None
 
 
 @dataclasses.dataclass(frozen=True)
@@ -98,24 +86,6 @@ class Request:
     is_canceled: Callable[[], bool] = lambda: False
 
 
-class Movable(Protocol):
-    """What can be rehearsed and shown: a plan.
-
-    Attributes:
-        duration: [s].
-        length: [m].
-    """
-
-    duration: float
-    length: float
-
-    def made(self) -> Callable[[float], HeadTrajectory]:
-        """Return what makes the motion for the time at which it starts [s]."""
-
-    def where(self, t: float) -> str:
-        """Return the name of its part at time ``t`` since its start [s]."""
-
-
 @dataclasses.dataclass(frozen=True)
 class _Prepared:
     course: Course
@@ -142,14 +112,6 @@ class _Run:
     told_at: float = -math.inf
 
 
-@dataclasses.dataclass(eq=False)
-class _Preview:
-    plan: Callable[[Reference], Movable]
-    done: RosFuture
-    since: float
-    job: Future[tuple[Movable, Rehearsal]] | None = None
-
-
 class HeadMotion:
     """Carries out requests; ``step`` is called with every reference that is sent."""
 
@@ -157,7 +119,8 @@ class HeadMotion:
         self,
         node: Node,
         ends: Endpoints,
-        config: Config,
+        own: TrajectoryGeneratorConfig,
+        rehearsals: Rehearsals,
         sequence: ReferenceSequence,
         on_path: Callable[[Movable], None],
     ) -> None:
@@ -165,29 +128,21 @@ class HeadMotion:
 
         Args:
             node, ends: where.
-            config: robot, controller, supervisor and the generator's own group.
+            own: the generator's own group.
+            rehearsals: try motions on the model.
             sequence: what sends references.
-            on_path: told of a motion that begins, or is to be shown.
+            on_path: told of a motion that begins.
         """
         self._node = node
-        quick = dataclasses.replace(config.scp_controller, rate_hz=_REHEARSAL_HZ)
-        self._config = dataclasses.replace(config, scp_controller=quick)
-        self._own = config.trajectory_generator
+        self._own = own
         self._sequence = sequence
         self._on_path = on_path
         self._count = 0
         self._now: _Run | None = None
         self._next: _Run | None = None
-        self._previews: list[_Preview] = []
         self._last_begin: Array | None = None
-        self._ending = threading.Event()
-        self._worker = ThreadPoolExecutor(1, thread_name_prefix="rehearsal")
+        self._rehearsals = rehearsals
         self._status = ends.publisher(topics.HEAD_TRAJECTORY_STATUS)
-
-    def close(self) -> None:
-        """Take no more requests; a rehearsal ends at once."""
-        self._ending.set()
-        self._worker.shutdown(wait=False, cancel_futures=True)
 
     def ask(self, request: Request, now: float) -> RosFuture:
         """Take a request; the future's result is an ``Outcome``: whether it began, or why not."""
@@ -204,18 +159,6 @@ class HeadMotion:
             return None
         back = Course((line_to(begin),), names=("the way back",))
         return self.ask(Request("~/return", lambda _: back, goes_back=True), now)
-
-    def preview(self, plan: Callable[[Reference], Movable], now: float) -> RosFuture:
-        """Plan, rehearse and show a motion; the future's result is an ``Outcome``.
-
-        Args:
-            plan: makes it from where it would begin; another thread calls it. What is wrong with it
-                is a ``SnakeError``.
-            now: time of the steady clock [s].
-        """
-        preview = _Preview(plan, RosFuture(), now)
-        self._previews.append(preview)
-        return preview.done
 
     def note_begin(self, pose: Array) -> None:
         """Remember where a motion begins that nobody asked for here."""
@@ -236,8 +179,6 @@ class HeadMotion:
 
     def step(self, around: Surroundings) -> None:
         """Go on with what was asked for."""
-        for preview in list(self._previews):
-            self._step_preview(preview, around)
         if self._next is not None:
             self._step_next(self._next, around)
         if self._now is not None:
@@ -260,39 +201,24 @@ class HeadMotion:
 
     def _submit(self, run: _Run, around: Surroundings) -> None:
         bold = run.request.skip_rehearsal
-        if self._wait_for_inputs(run.since, around, bold):
+        if wait_for_inputs(run.since, around, bold):
             return
         start = self._sequence.here(around.now, around.head)
-        missing = _missing(start, around, bold)
+        missing = what_is_missing(start, around, bold)
         if missing or start is None:
             self._end(run, Status.NO_HEAD, missing, around)
             return
         # What it needs, for the other thread.
         course, own, now, over = run.request.course, self._own, around.now, run.over.is_set
+        rehearsals = self._rehearsals
 
         def prepare() -> _Prepared:
             made = course(now)
             plan = Plan(own, made, start)
-            found = None if bold else self._rehearse(plan, around, over)
+            found = None if bold else rehearsals.rehearse(plan, around, over)
             return _Prepared(made, start, plan, found)
 
-        run.job = self._worker.submit(prepare)
-
-    def _wait_for_inputs(self, since: float, around: Surroundings, bold: bool) -> bool:
-        missing = around.head is None or (around.phi is None and not bold)
-        return missing and around.now - since < _INPUT_WAIT_S
-
-    def _rehearse(self, plan: Movable, around: Surroundings, over: Callable[[], bool]) -> Rehearsal:
-        assert around.phi is not None
-        assert around.head is not None
-        return rehearse(
-            self._config,
-            around.phi,
-            around.head,
-            plan.made()(0.0).sample,
-            plan.duration,
-            lambda: over() or self._ending.is_set(),
-        )
+        run.job = rehearsals.submit(prepare)
 
     def _prepared(
         self, run: _Run, job: Future[_Prepared], around: Surroundings
@@ -308,7 +234,7 @@ class HeadMotion:
             return None
         found = prepared.found
         if found is not None and not found.possible:
-            self._end(run, Status.UNREACHABLE, _words(prepared.plan, found), around)
+            self._end(run, Status.UNREACHABLE, in_words(prepared.plan, found), around)
             return None
         return prepared
 
@@ -320,10 +246,10 @@ class HeadMotion:
         if start is None:
             # A rehearsal can keep a busy computer from hearing the head just when it ends.
             since = run.headless_since = run.headless_since or around.now
-            if around.now - since < _INPUT_WAIT_S:
+            if around.now - since < INPUT_WAIT_S:
                 self._tell(run, around, "waiting")
             else:
-                self._end(run, Status.NO_HEAD, _NO_HEAD, around)
+                self._end(run, Status.NO_HEAD, NO_HEAD, around)
             return
         plan = prepared.plan
         # Preparing has taken a moment, in which the reference may have gone on.
@@ -441,65 +367,6 @@ class HeadMotion:
         if not run.begun.done():
             run.begun.set_result(Outcome(False, text))
         run.request.on_status(status)
-
-    # Only to be shown.
-
-    def _step_preview(self, preview: _Preview, around: Surroundings) -> None:
-        if preview.job is None:
-            if self._wait_for_inputs(preview.since, around, bold=False):
-                return
-            start = self._sequence.here(around.now, around.head)
-            missing = _missing(start, around, bold=False)
-            if missing or start is None:
-                self._answer(preview, Outcome(False, missing))
-                return
-
-            def prepare() -> tuple[Movable, Rehearsal]:
-                plan = preview.plan(start)
-                return plan, self._rehearse(plan, around, lambda: False)
-
-            preview.job = self._worker.submit(prepare)
-        elif preview.job.done():
-            self._answer(preview, self._seen(preview.job))
-
-    def _seen(self, job: Future[tuple[Movable, Rehearsal]]) -> Outcome:
-        try:
-            plan, found = job.result()
-        except SnakeError as error:
-            return Outcome(False, str(error))
-        except NO_ANSWER as error:
-            return Outcome(False, f"the rehearsal failed: {error}")
-        self._on_path(plan)
-        words = f"{plan.duration:.1f} s, {plan.length:.2f} m; "
-        if not found.possible:
-            return Outcome(False, words + _words(plan, found))
-        return Outcome(
-            True,
-            f"{words}the rehearsal came through in {found.took:.2f} of this time, with the head at "
-            f"most {1e3 * found.error_m:.0f} mm and {found.error_rad:.2f} rad off",
-        )
-
-    def _answer(self, preview: _Preview, outcome: Outcome) -> None:
-        self._previews.remove(preview)
-        preview.done.set_result(outcome)
-
-
-_NO_HEAD = "no fresh head/odometry"
-
-
-def _missing(start: Reference | None, around: Surroundings, bold: bool) -> str:
-    """Return what must be known and is not, empty if nothing."""
-    if start is None:
-        return _NO_HEAD
-    if bold or (around.head is not None and around.phi is not None):
-        return ""
-    what = "head/odometry" if around.head is None else "joint_states"
-    return f"cannot be rehearsed: no fresh {what}"
-
-
-def _words(plan: Movable, found: Rehearsal) -> str:
-    where = "" if found.at is None else plan.where(found.at)
-    return f"{where}: {found.text}" if where else found.text
 
 
 def _is_same(a: Reference, b: Reference) -> bool:

@@ -51,10 +51,12 @@ from snake_control.nodes.conversions import (
 from snake_control.nodes.endpoints import Endpoints
 from snake_control.nodes.head_action import HeadAction
 from snake_control.nodes.head_messages import MessageMotion, path_motion, trajectory_motion
-from snake_control.nodes.head_motion import HeadMotion, Movable, Request, Surroundings
+from snake_control.nodes.head_motion import HeadMotion, Request
+from snake_control.nodes.head_preview import HeadPreviews
 from snake_control.nodes.inputs import FUTURE_TOLERANCE_S, Input
 from snake_control.nodes.parameters import NodeParameters
 from snake_control.nodes.process import run
+from snake_control.nodes.rehearsals import Movable, Rehearsals, Surroundings
 from snake_control.trajectory.configured import ENDLESS_S, ConfiguredPlan
 from snake_control.trajectory.course_text import read_course
 from snake_control.trajectory.plan import Plan
@@ -94,7 +96,16 @@ class TrajectoryGenerator(Node):
             lambda message: joint_motion(message, configured.robot.joint_names)[0],
         )
         ends = Endpoints(self)
-        self._motion = HeadMotion(self, ends, configured, self._sequence, self._publish_plan)
+        self._rehearsals = Rehearsals(configured)
+        self._motion = HeadMotion(
+            self,
+            ends,
+            configured.trajectory_generator,
+            self._rehearsals,
+            self._sequence,
+            self._publish_plan,
+        )
+        self._previews = HeadPreviews(self._rehearsals, self._sequence, self._publish_plan)
         self._action = HeadAction(self, self._motion, config.frame_id, self._steady_s)
         for t, convert in (
             (topics.HEAD_PATH, path_motion),
@@ -147,7 +158,9 @@ class TrajectoryGenerator(Node):
         scale = 1.0 if controller is None else controller.reference_scale
         self._sequence.time_scale = scale if 0.0 <= scale <= 1.0 else 1.0
         phi = None if self._joints.problem(now) else self._joints.value
-        self._motion.step(Surroundings(steady, self._head_pose(now), phi, controller))
+        around = Surroundings(steady, self._head_pose(now), phi, controller)
+        self._previews.step(around)
+        self._motion.step(around)
         reference = self._sequence.sample(steady)
         if reference is not None:
             self._reference.publish(reference_message(reference, now, self._config.frame_id))
@@ -192,7 +205,7 @@ class TrajectoryGenerator(Node):
                 return Plan(config, read_course(config.trajectory_file), start)
             return ConfiguredPlan(config, start.w_d)
 
-        return _answer(response, await self._motion.preview(plan, self._steady_s()))
+        return _answer(response, await self._previews.ask(plan, self._steady_s()))
 
     def _on_motion(self, source: str, convert: Callable[..., MessageMotion], message: Any) -> None:
         """Ask for the motion in a message of head/path or head/trajectory."""
@@ -289,7 +302,7 @@ class TrajectoryGenerator(Node):
 
     def close(self) -> None:
         """References cease, and the controller then commands zero."""
-        self._motion.close()
+        self._rehearsals.close()
         self._action.close()
 
 
