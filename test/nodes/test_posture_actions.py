@@ -12,6 +12,7 @@ from snake_interfaces.msg import BusState, ControllerState
 from std_srvs.srv import SetBool
 
 from snake_control.config import load
+from snake_control.model.bodies import Bodies
 from snake_control.nodes import topics
 from snake_control.nodes.conversions import header, pose_message, stamp_ns
 from snake_control.plant.kinematic import KinematicPlant
@@ -337,7 +338,9 @@ def test_a_body_about_to_curl_into_itself_ends_a_reshape_and_a_cancellation_does
     status, result = sent.result()
     assert (status, result.code) == (ABORTED, Reshape.Result.STOPPED)
     assert result.text.startswith("the robot itself (two links would be")
-    assert -1.95 < phi(robot)[7] < -1.7
+    # Where they meet depends on how the rest of the body came along; stopping takes a moment.
+    assert -2.2 < phi(robot)[7] < -1.7
+    assert Bodies(PAPER.robot, phi(robot)).self_clearance > -0.005
 
     robot.reshapes.feedback.clear()
     bring_to(robot, "start")
