@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from snake_control.config import Config, RobotConfig, SupervisorConfig, load
-from snake_control.control.barriers import Limit
+from snake_control.control.barriers import Barriers, Limit
+from snake_control.control.escape import Escape
 from snake_control.control.reference import Reference
 from snake_control.control.scp_controller import ScpController
 from snake_control.control.supervisor import HOLDING_AFTER_S, HOLDING_BELOW, Supervisor
@@ -17,7 +18,9 @@ from snake_control.errors import ModelError
 from snake_control.experiment.cases import config_directory, load_case
 from snake_control.experiment.guided import GuidedRobot
 from snake_control.model.bodies import Bodies
-from snake_control.model.floor import head_pose_on_floor
+from snake_control.model.floor import geometry_on_floor, head_pose_on_floor
+from snake_control.model.floor_clearance import floor_clearance
+from snake_control.model.posture import Posture
 from snake_control.trajectory.approach import Approach
 from snake_control.trajectory.hold import Hold
 from snake_control.trajectory.line import Line
@@ -203,6 +206,30 @@ def test_the_head_is_not_led_into_the_floor(config: Config) -> None:
             assert robot.state.w[2] > top + 0.02
     assert min(heights["limits"]) > config.supervisor.floor_stop_m - 1e-4
     assert min(heights["none"]) < 0.0
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_near_the_floor_the_scps_lift_the_lowest_link_and_leave_the_head_at_rest(
+    config: Config, seed: int
+) -> None:
+    """Where a link other than the first is the lowest: the head's own height is not theirs."""
+    robot = config.robot
+    rng = np.random.default_rng(seed)
+    while True:
+        phi = np.array(robot.start_joint_angles_rad)
+        phi[:5] = rng.uniform(-1.2, 1.2, 5)
+        lowest = floor_clearance(geometry_on_floor(robot, phi))
+        if lowest.link > 1 and 0.0 < lowest.height < 0.05:
+            break
+    near = dataclasses.replace(config.supervisor, floor_warn_m=0.1)
+    posture = Posture(robot, np.concatenate((head_pose_on_floor(robot, phi, np.zeros(3)), phi)))
+    escape = Escape(robot, near, Barriers(robot, near))
+    scps = escape.velocities(posture, {Limit.FLOOR: 1.0})
+    u = np.array(posture.k.joint_velocities([0.0] * 6, scps.tolist()))
+    assert np.abs(u).max() == pytest.approx(near.escape_speed_rad_s)
+    h = 1e-6
+    above = [floor_clearance(geometry_on_floor(robot, phi + s * u)).height for s in (-h, h)]
+    assert above[1] > above[0]
 
 
 def test_a_motion_that_begins_in_a_singular_posture_may_lead_out_by_any_way(
