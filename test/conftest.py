@@ -44,13 +44,15 @@ _ALONE = (
     "poses/",
 )
 """Of the others, what needs a machine for itself: a whole robot, or a measured time."""
+_MORE_TRIES, _AFTER_S = 3, 3
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Mark tests of whole processes in real time, and give them a second try, which is shown.
+    """Mark tests of whole processes in real time, and give them further tries, which are shown.
 
     A busy machine may withhold the processor for longer than a watchdog allows; the nodes are right
-    to stop then, and the test has shown nothing.
+    to stop then, and the test has shown nothing. Such moments last seconds: tries that follow each
+    other at once meet the same one. What is wrong in the code is wrong at each try.
     """
     here = Path(__file__).parent
     for item in items:
@@ -60,7 +62,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             if path.as_posix().startswith(_ALONE):
                 item.add_marker(pytest.mark.alone)
             if config.pluginmanager.hasplugin("rerunfailures"):
-                item.add_marker(pytest.mark.flaky(reruns=1))
+                item.add_marker(pytest.mark.flaky(reruns=_MORE_TRIES, reruns_delay=_AFTER_S))
 
 
 @pytest.fixture

@@ -32,6 +32,7 @@ from snake_control.nodes.transport import without_shared_memory
 from support.process import Process
 
 _ASK_AGAIN_S = 1.0
+_LOOK_EVERY_S = 0.02
 
 ROOT = Path(__file__).resolve().parents[2]
 CONFIG = ROOT / "config"
@@ -47,8 +48,7 @@ class _Service(NamedTuple):
 class Recorder:
     """Keeps every message of one topic, oldest first."""
 
-    def __init__(self, changed: threading.Condition) -> None:
-        self._changed = changed
+    def __init__(self) -> None:
         self._messages: list[Any] = []
 
     @property
@@ -67,8 +67,6 @@ class Recorder:
 
     def _take(self, message: Any) -> None:
         self._messages.append(message)
-        with self._changed:
-            self._changed.notify_all()
 
 
 class Graph:
@@ -92,7 +90,8 @@ class Graph:
         }
         self.environment = os.environ | ours
         self._processes: list[Process] = []
-        self._changed = threading.Condition()
+        self._pause = threading.Event()
+        self._clients: dict[tuple[type, str, int, int | None], Any] = {}
         self._stop = threading.Event()
         # rcl reads these from the environment of the process while it initialises a context.
         before = {name: os.environ.get(name) for name in ours}
@@ -129,7 +128,8 @@ class Graph:
                 process.kill()
                 process.wait()
         self._stop.set()
-        self._executor.wake()
+        # Something to do, for being woken alone does not end its turn.
+        self._executor.create_task(lambda: None)
         self._threads.shutdown()
         self._executor.shutdown()
         self.node.destroy_node()
@@ -177,7 +177,7 @@ class Graph:
 
     def subscribe(self, topic: Any) -> Recorder:
         """Record a topic (of ``snake_control.nodes.topics``) from now on."""
-        recorder = Recorder(self._changed)
+        recorder = Recorder()
         self.node.create_subscription(topic.type, topic.name, recorder._take, topic.qos)
         self._executor.wake()
         return recorder
@@ -193,7 +193,7 @@ class Graph:
     def call(self, node_name: str, service: Any, request: Any, timeout_s: float = 30.0) -> Any:
         """Call a service (of ``snake_control.nodes.topics``) of a node and return the response."""
         name = service.name.replace("~", f"/{node_name}", 1)
-        client = self.node.create_client(service.type, name)
+        client = self._client(service.type, name)
         deadline = time.monotonic() + timeout_s
         self.wait_for(client.service_is_ready, timeout_s, f"service {name}")
         self._wait_until_known_to(node_name, timeout_s)
@@ -201,13 +201,26 @@ class Graph:
         self.wait_for(future.done, max(1.0, deadline - time.monotonic()), f"a reply of {name}")
         return future.result()
 
+    def _client(self, service: type, name: str, newer_than: int | None = None) -> Any:
+        """A client, the same one each time, for the test's node waits for all that it has.
+
+        After the start of a process there are new ones: it discovers them in their order, and
+        ``_wait_until_known_to`` builds on that.
+        """
+        key = service, name, len(self._processes), newer_than
+        if key not in self._clients:
+            self._clients[key] = self.node.create_client(service, name)
+            self._executor.wake()
+        return self._clients[key]
+
     def _wait_until_known_to(self, node_name: str, timeout_s: float) -> None:
         """Wait until a node has discovered all clients made so far.
 
         A reply is lost while the server has not discovered its client, which the client cannot see.
         Clients are announced in order: when a newer one gets replies, the older ones will, too.
         """
-        probe = self.node.create_client(GetParameters, f"/{node_name}/get_parameters")
+        ours = sum(newer_than is None for *_, newer_than in self._clients)
+        probe = self._client(GetParameters, f"/{node_name}/get_parameters", newer_than=ours)
         self.wait_for(probe.service_is_ready, timeout_s, f"parameters of {node_name}")
         questions: list[tuple[float, Any]] = []
 
@@ -289,12 +302,14 @@ class Graph:
             if left <= 0 or crashed:
                 why = f"{', '.join(crashed)} failed" if crashed else f"not within {timeout_s} s"
                 raise AssertionError(f"{what}: {why}\n{self.report()}")
-            with self._changed:
-                self._changed.wait(min(0.02, left))
+            # Not at every message: of a whole robot there are hundreds each second, and what the
+            # test takes of the processor its nodes do not get.
+            self._pause.wait(min(_LOOK_EVERY_S, left))
 
     def _spin(self) -> None:
         while not self._stop.is_set():
-            self._executor.spin_once(timeout_sec=0.2)
+            # A time-out would cost a timer of its own at each message.
+            self._executor.spin_once()
 
 
 def _reserve_domain() -> tuple[int, IO[str]]:
