@@ -9,6 +9,9 @@ all else is the rest. What the controller works out while a message waits is in 
 The relay has as many messages between as many processes, as often as there are commands. It runs
 all the time: beside the robot, between the robot's poses, so that both meet the same machine at the
 same load; and alone before, which says what that load is worth.
+
+What the nodes take of the processor the while is measured, too, beside a link of that relay, which
+is a node that does nothing with a message but pass it on, 50 times a second.
 """
 
 from __future__ import annotations
@@ -24,6 +27,7 @@ import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import rclpy
@@ -34,6 +38,7 @@ from rclpy.signals import SignalHandlerOptions
 from snake_interfaces.msg import BusState, ControllerState
 
 from snake_control.cli.node_processes import NodeProcesses
+from snake_control.cli.processor import ProcessorWatch
 from snake_control.cli.ros_domain import own_domain
 from snake_control.nodes import topics
 from snake_control.nodes.transport import without_shared_memory
@@ -112,6 +117,9 @@ class _Relay:
         t = topics.MOCAP_POSE
         self._publisher = bench.create_publisher(t.type, "relay_0", t.qos)
 
+    def pids(self) -> dict[str, int]:
+        return {f"relay_{k}": process.pid for k, process in enumerate(self._processes)}
+
     def await_start(self) -> None:
         if not self._bench.spin(self._publisher.get_subscription_count, _START_S):
             raise RuntimeError("the relay does not start")
@@ -150,13 +158,22 @@ def _relay_alone(bench: _Bench, relay: _Relay) -> tuple[float, float]:
     return begun, bench.now()
 
 
-def _robot(bench: _Bench, relay: _Relay, directory: Path) -> tuple[_Times, tuple[float, float]]:
-    """Let the robot follow its line, poses going through the relay, too.
+class _Run(NamedTuple):
+    """What the robot did.
 
-    Returns:
-        The times of all commands that followed a pose and reached the bus [s]; and when that began
-        and ended.
+    Attributes:
+        times: of all commands that followed a pose and reached the bus [s].
+        span: when that began and ended [s].
+        shares: of a core that each process took meanwhile, the relay's included.
     """
+
+    times: _Times
+    span: tuple[float, float]
+    shares: dict[str, float]
+
+
+def _robot(bench: _Bench, relay: _Relay, directory: Path) -> _Run:
+    """Let the robot follow its line, poses going through the relay, too."""
     processes = NodeProcesses(directory, os.environ | {"ROS_LOG_DIR": str(directory)})
     config = _ROOT / "config"
     files = ["--params-file", str(config / "paper_robot.yaml")]
@@ -204,9 +221,12 @@ def _robot(bench: _Bench, relay: _Relay, directory: Path) -> tuple[_Times, tuple
             raise RuntimeError(f"the robot does not follow: {bench.text}")
         bench.spin_for(SETTLE_S)
         bench.steps.clear()
+        watch, pids = ProcessorWatch(0.0), processes.pids() | relay.pids()
         begun = bench.now()
+        watch.look(begun, pids)
         bench.spin_for(ROBOT_S)
         ended = bench.now()
+        watch.look(ended, pids)
         processes.check()
     finally:
         processes.stop(reversed(own), 8.0)
@@ -228,7 +248,7 @@ def _robot(bench: _Bench, relay: _Relay, directory: Path) -> tuple[_Times, tuple
         found["step"].append(step.step_time)
     if not found["rest"]:
         raise RuntimeError(f"the robot did not follow: {bench.text}")
-    return found, (begun, ended)
+    return _Run(found, (begun, ended), watch.shares() or {})
 
 
 def _figures(name: str, times: list[float]) -> dict[str, float]:
@@ -250,7 +270,7 @@ def measure(_blocks: int, _calls: int) -> dict[str, dict[str, float]]:
             try:
                 relay.await_start()
                 alone = _relay_alone(bench, relay)
-                robot, beside = _robot(bench, relay, directory)
+                run = _robot(bench, relay, directory)
             finally:
                 relay.end()
             poses = relay.times()
@@ -261,7 +281,12 @@ def measure(_blocks: int, _calls: int) -> dict[str, dict[str, float]]:
     def taken(span: tuple[float, float]) -> list[float]:
         return [each for sent, each in poses if span[0] <= sent <= span[1]]
 
+    robot, beside = run.times, run.span
     rest = statistics.median(robot["rest"])
+    of_relay = statistics.median(
+        share for name, share in run.shares.items() if name.startswith("relay_")
+    )
+    of_nodes = {name: share for name, share in run.shares.items() if not name.startswith("relay_")}
     return {
         "robot": {
             "commands": float(len(robot["rest"])),
@@ -278,5 +303,11 @@ def measure(_blocks: int, _calls: int) -> dict[str, dict[str, float]]:
             "poses": float(len(taken(beside))),
             **_figures("beside", taken(beside)),
             **_figures("alone", taken(alone)),
+        },
+        "processor": {
+            **{f"{name}_percent_of_a_core": 100.0 * share for name, share in of_nodes.items()},
+            "relay_percent_of_a_core": 100.0 * of_relay,
+            "all_nodes_percent_of_a_core": 100.0 * sum(of_nodes.values()),
+            "all_nodes_to_relay": sum(of_nodes.values()) / of_relay,
         },
     }

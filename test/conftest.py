@@ -15,6 +15,7 @@ _ANY_TIME = (
     "cli/test_evaluate.py",
     "cli/test_experiment.py",
     "cli/test_memory.py",
+    "cli/test_processor.py",
     "cli/test_progress.py",
     "cli/test_recording.py",
     "cli/test_scp_study.py",

@@ -30,6 +30,7 @@ from snake_control.cli.demo_arguments import DemoArguments, parse_arguments
 from snake_control.cli.demo_outcome import Outcome, RunJudge, progress_text
 from snake_control.cli.memory import MemoryWatch
 from snake_control.cli.node_processes import NodeProcesses
+from snake_control.cli.processor import ProcessorWatch
 from snake_control.cli.progress import ProgressLine
 from snake_control.cli.ros_domain import own_domain
 from snake_control.config import Config
@@ -108,6 +109,7 @@ class Demo:
         }
         self.processes = NodeProcesses(arguments.out / "logs", environment)
         self.memory = MemoryWatch()
+        self.processor = ProcessorWatch()
         self.series = Series(config.robot, arguments.out / "series.csv")
         self.startup_s: float | None = None
         self.stop_findings: list[str] = []
@@ -223,6 +225,7 @@ class Demo:
             self._take_all(recorder)
             now = time.monotonic()
             self.memory.look(now, self.processes.pids())
+            self.processor.look(now, self.processes.pids())
             if recorder.controller is not seen:
                 seen, heard = recorder.controller, now
             elif now - heard > _SILENCE_TIMEOUT_S:
@@ -379,6 +382,7 @@ def _write_results(arguments: DemoArguments, config: Config, demo: Demo, outcome
     summary["exit_code"] = outcome.exit_code
     summary["startup_s"] = demo.startup_s
     summary["memory"] = demo.memory.growth()
+    summary["processor"] = demo.processor.shares()
     summary["stop_findings"] = demo.stop_findings
     write_summary(summary, arguments.out / "summary.json")
     figures = draw_all(demo.series, run.case, arguments.out)

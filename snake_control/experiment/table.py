@@ -27,6 +27,7 @@ def format_summary(summary: Mapping[str, Any]) -> str:
         *_control(summary["control"]),
         *_bus(summary["bus"]),
         *_memory(summary.get("memory")),
+        *_processor(summary.get("processor")),
     ]
     return "\n".join(lines)
 
@@ -105,6 +106,14 @@ def _memory(memory: Mapping[str, Any] | None) -> list[str]:
     name, most = max(memory.items(), key=lambda item: float(item[1]["growth_bytes"]))
     growth = _number(most["growth_bytes"], "MB", 2, 1e-6)
     return [_line("memory", f"grew most in {name}: {growth} after the first 20 s")]
+
+
+def _processor(processor: Mapping[str, float] | None) -> list[str]:
+    if not processor:
+        return []
+    name, most = max(processor.items(), key=lambda item: item[1])
+    total = _number(sum(processor.values()), "% of one core", 0, 100.0)
+    return [_line("processor", f"{total}; most of it {name}: {_number(most, '%', 0, 100.0)}")]
 
 
 def _fell(summary: Mapping[str, Any]) -> str:

@@ -239,6 +239,15 @@ def test_json_is_finite_and_the_table_complete_whatever_the_series(series, tmp_p
     assert max(len(line) for line in table.splitlines()) <= 80
 
 
+def test_table_says_what_the_nodes_take_of_the_processor():
+    summary = summarise(series_of([0.0, 1.0]), RUN)
+    assert "processor" not in format_summary(summary)
+    summary["processor"] = {"mock_bus": 0.2, "scp_controller": 0.254}
+    table = format_summary(summary)
+    assert "45 % of one core; most of it scp_controller: 25 %" in table
+    assert max(len(line) for line in table.splitlines()) <= 80
+
+
 def test_table_names_the_joint_at_the_end_of_its_range():
     summary = summarise(series_of([0.0, 1.0], lambda t: {"range_limited": (11,) if t else ()}), RUN)
     assert "joint_11 first, at 1.0 s" in format_summary(summary)
