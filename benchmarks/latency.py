@@ -283,10 +283,9 @@ def measure(_blocks: int, _calls: int) -> dict[str, dict[str, float]]:
 
     robot, beside = run.times, run.span
     rest = statistics.median(robot["rest"])
-    of_relay = statistics.median(
-        share for name, share in run.shares.items() if name.startswith("relay_")
-    )
-    of_nodes = {name: share for name, share in run.shares.items() if not name.startswith("relay_")}
+    shares = dict(run.shares)
+    of_relay = statistics.median(shares.pop(f"relay_{k}") for k in range(3))
+    of_mock = shares.pop("mock_bus")
     return {
         "robot": {
             "commands": float(len(robot["rest"])),
@@ -305,9 +304,10 @@ def measure(_blocks: int, _calls: int) -> dict[str, dict[str, float]]:
             **_figures("alone", taken(alone)),
         },
         "processor": {
-            **{f"{name}_percent_of_a_core": 100.0 * share for name, share in of_nodes.items()},
-            "relay_percent_of_a_core": 100.0 * of_relay,
-            "all_nodes_percent_of_a_core": 100.0 * sum(of_nodes.values()),
-            "all_nodes_to_relay": sum(of_nodes.values()) / of_relay,
+            **{f"{name}_percent_of_a_core": 100.0 * share for name, share in shares.items()},
+            "all_nodes_percent_of_a_core": 100.0 * sum(shares.values()),
+            "mock_percent_of_a_core": 100.0 * of_mock,
+            "one_relay_percent_of_a_core": 100.0 * of_relay,
+            "all_nodes_to_one_relay": sum(shares.values()) / of_relay,
         },
     }

@@ -45,6 +45,8 @@ _ALONE = (
     "poses/",
 )
 """Of the others, what needs a machine for itself: a whole robot, or a measured time."""
+_JUDGE_THEMSELVES = ("faults/", "poses/")
+"""They see whether the machine stood still, and try again by themselves."""
 _MORE_TRIES, _AFTER_S = 3, 3
 
 
@@ -52,8 +54,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     """Mark tests of whole processes in real time, and give them further tries, which are shown.
 
     A busy machine may withhold the processor for longer than a watchdog allows; the nodes are right
-    to stop then, and the test has shown nothing. Such moments last seconds: tries that follow each
-    other at once meet the same one. What is wrong in the code is wrong at each try.
+    to stop then, and the test has shown nothing. Whole robots, of six processes, meet that first,
+    and such moments last seconds: tries that follow each other at once meet the same one.
     """
     here = Path(__file__).parent
     for item in items:
@@ -63,7 +65,10 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             if path.as_posix().startswith(_ALONE):
                 item.add_marker(pytest.mark.alone)
             if config.pluginmanager.hasplugin("rerunfailures"):
-                item.add_marker(pytest.mark.flaky(reruns=_MORE_TRIES, reruns_delay=_AFTER_S))
+                name = path.as_posix()
+                patient = name.startswith(_ALONE) and not name.startswith(_JUDGE_THEMSELVES)
+                more = _MORE_TRIES if patient else 1
+                item.add_marker(pytest.mark.flaky(reruns=more, reruns_delay=_AFTER_S))
 
 
 @pytest.fixture

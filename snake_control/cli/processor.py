@@ -30,6 +30,7 @@ class ProcessorWatch:
         self._warm_up_s = warm_up_s
         self._read = read or processor_s
         self._next_at: float | None = None
+        self._pids: dict[str, int] = {}
         self._first: dict[str, tuple[float, float]] = {}
         self._last: dict[str, tuple[float, float]] = {}
 
@@ -47,9 +48,12 @@ class ProcessorWatch:
         self._next_at = now + _PERIOD_S
         for name, pid in pids.items():
             taken = self._read(pid)
-            if taken is not None:
-                self._first.setdefault(name, (now, taken))
-                self._last[name] = now, taken
+            if taken is None:
+                continue
+            if self._pids.get(name) != pid:
+                # Another process of that name has taken nothing of the one before.
+                self._pids[name], self._first[name] = pid, (now, taken)
+            self._last[name] = now, taken
 
     def shares(self) -> dict[str, float] | None:
         """Return by name what each took, 1 being all of one core.

@@ -236,6 +236,7 @@ def _check_rates(config: Config) -> None:
             config.trajectory_generator.rate_hz,
             controller.reference_timeout_s,
         ),
+        ("pose_input: max_rate_hz", config.pose_input.max_rate_hz, controller.head_timeout_s),
     )
     for field, rate_hz, timeout_s in pairs:
         if 2.0 / rate_hz > timeout_s:

@@ -66,6 +66,12 @@ class PoseInputConfig:
     cutoff_hz: float = parameter(
         3.0, "bandwidth of the filter that yields pose and twist", low=0.1, high=100.0
     )
+    max_rate_hz: float = parameter(
+        125.0,
+        "odometry is published no more often than this on average; all poses serve the filter",
+        low=20.0,
+        high=1000.0,
+    )
     timeout_s: float = parameter(
         0.1, "without a pose this fresh the head pose is not valid [s]", low=0.01, high=10.0
     )

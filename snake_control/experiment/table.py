@@ -113,7 +113,9 @@ def _processor(processor: Mapping[str, float] | None) -> list[str]:
         return []
     name, most = max(processor.items(), key=lambda item: item[1])
     total = _number(sum(processor.values()), "% of one core", 0, 100.0)
-    return [_line("processor", f"{total}; most of it {name}: {_number(most, '%', 0, 100.0)}")]
+    mock = processor.get("mock_bus")
+    of_it = "" if mock is None else f" (the mock {_number(mock, '%', 0, 100.0)})"
+    return [_line("processor", f"{total}{of_it}; {name} {_number(most, '%', 0, 100.0)}")]
 
 
 def _fell(summary: Mapping[str, Any]) -> str:

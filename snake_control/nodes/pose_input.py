@@ -21,6 +21,7 @@ from snake_control.control.pose_bridge import PoseBridge
 from snake_control.control.pose_hypotheses import Cause
 from snake_control.control.pose_intake import Measurement, PoseIntake
 from snake_control.control.pose_watch import PoseWatch
+from snake_control.control.rate_limit import RateLimit
 from snake_control.errors import ModelError
 from snake_control.nodes import topics
 from snake_control.nodes.conversions import (
@@ -81,6 +82,7 @@ class PoseInput(Node):
         self._suspicion: tuple[Cause, tuple[int, ...]] = (Cause.NOTHING, ())
         self._joints_problem = ""
         self._odometry_ns = 0
+        self._odometry_limit = RateLimit(self._config.max_rate_hz)
         self._intake = PoseIntake(self._config, FUTURE_TOLERANCE_S, self._bridge)
         self._fault: Rejection | None = None
         self._fault_ns = 0
@@ -126,6 +128,7 @@ class PoseInput(Node):
             # By the clock alone, too: odometry must not wait until an old time comes again.
             if self._intake.set_back or self._odometry_ns - now > 1e9 * FUTURE_TOLERANCE_S:
                 self._odometry_ns = 0
+                self._odometry_limit.reset()
                 if self._watch is not None:
                     self._watch.reset()
         else:
@@ -133,7 +136,9 @@ class PoseInput(Node):
         if isinstance(result, HeadEstimate):
             self._fault = None
             self._age_on_arrival_s = (now - result.stamp_ns) * 1e-9
-            self._publish_odometry(result)
+            # Those of cameras that are quicker than anybody here needs only serve the filter, too.
+            if self._odometry_limit.allows(result.stamp_ns):
+                self._publish_odometry(result)
             self._take_note(result, now)
         elif result.reason.is_fault:
             self._fault, self._fault_ns = result, self._steady_ns()

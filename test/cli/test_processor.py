@@ -7,37 +7,46 @@ import pytest
 
 from snake_control.cli.processor import ProcessorWatch, processor_s
 
+_WARM_UP_S = 5.0
 
-def shares(times, warm_up_s=5.0, period_s=0.5):
-    """Look every ``period_s`` seconds at a process that has taken these times by then."""
-    taken = iter(times)
-    watch = ProcessorWatch(warm_up_s, read=lambda _: next(taken))
-    for k in range(200):
-        try:
-            watch.look(100.0 + k * period_s, {"node": 1})
-        except StopIteration:
-            break
+
+def share(duration_s, pid_at=lambda t: 1, taken_at=None):
+    """Watch a node that takes all of a core for 5 s and a fifth of one from then on."""
+    time_s = 0.0
+
+    def taken(pid):
+        return min(time_s, _WARM_UP_S) + 0.2 * max(0.0, time_s - _WARM_UP_S)
+
+    watch = ProcessorWatch(_WARM_UP_S, read=taken if taken_at is None else taken_at)
+    while time_s <= duration_s:
+        watch.look(100.0 + time_s, {"node": pid_at(time_s)})
+        time_s += 0.5
     return watch.shares()
 
 
 def test_what_is_taken_after_the_warm_up_counts():
-    # 2.5 s are read at 5 s; from then on 0.2 s in each second.
-    assert shares([2.5 + 0.2 * k for k in range(20)])["node"] == pytest.approx(0.2)
+    assert share(20.0) == {"node": pytest.approx(0.2)}
 
 
 def test_a_run_too_short_to_tell_says_nothing():
-    assert shares([]) is None
-    assert shares([1.0]) is None
+    assert share(2.0) is None
+    assert share(_WARM_UP_S) is None
 
 
-def test_a_process_that_ends_counts_while_it_was_there():
-    watch = ProcessorWatch(0.0, read=lambda pid: None if pid == 0 else 2.0 * pid)
-    for k, pids in enumerate(({"a": 1, "b": 0}, {"a": 2, "b": 0}, {"a": 0, "b": 0})):
-        watch.look(float(k), pids)
-    assert watch.shares() == {"a": 2.0}
+def test_a_process_that_is_started_anew_counts_anew():
+    taken = {1: iter([50.0, 51.0, 52.0]), 2: iter([0.0, 0.1, 0.2])}
+    found = share(
+        11.0, lambda t: 1 if t < 8.0 else 2, lambda pid: next(taken[pid], 0.3 if pid == 2 else 52.0)
+    )
+    assert found == {"node": pytest.approx(0.1)}
 
 
-def test_time_of_a_process_that_computes_and_of_one_that_waits():
+def test_a_process_that_has_ended_counts_while_it_was_there():
+    times = iter([1.0, 1.5, 2.0])
+    assert share(20.0, taken_at=lambda _: next(times, None)) == {"node": pytest.approx(0.5)}
+
+
+def test_time_of_a_process_that_computes():
     assert processor_s(os.getpid()) == pytest.approx(time.process_time(), abs=0.05)
     before = processor_s(os.getpid())
     begin = time.process_time()
@@ -46,7 +55,15 @@ def test_time_of_a_process_that_computes_and_of_one_that_waits():
     assert processor_s(os.getpid()) - before == pytest.approx(0.3, abs=0.05)
 
 
-def test_none_of_a_process_that_has_ended():
-    process = subprocess.Popen([sys.executable, "-c", ""])
-    process.wait()
+def test_a_process_that_waits_takes_none_and_one_that_has_ended_is_not_there():
+    code = "import sys; print(flush=True); sys.stdin.read()"
+    pipe = subprocess.PIPE
+    with subprocess.Popen([sys.executable, "-c", code], stdin=pipe, stdout=pipe) as process:
+        process.stdout.readline()
+        before = processor_s(process.pid)
+        begin = time.process_time()
+        while time.process_time() < begin + 0.2:
+            pass
+        assert processor_s(process.pid) - before < 0.05
+        process.stdin.close()
     assert processor_s(process.pid) is None

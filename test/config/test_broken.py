@@ -302,6 +302,17 @@ NODE_CASES = {
 }
 
 
+def test_odometry_has_to_come_as_often_as_the_controller_waits(tmp_path):
+    text = """
+    /**/pose_input: {ros__parameters: {max_rate_hz: 30.0}}
+    /**/scp_controller: {ros__parameters: {head_timeout_s: 0.05}}
+    """
+    with pytest.raises(ConfigError) as caught:
+        load(PAPER_YAML, broken(tmp_path, text))
+    assert caught.value.field == "pose_input: max_rate_hz"
+    assert "at least 40: the receiver waits 0.05 s" in str(caught.value)
+
+
 @pytest.mark.parametrize("case", NODE_CASES.values(), ids=NODE_CASES)
 def test_field_of_a_node_is_named(tmp_path, case):
     node, line, field, message = case

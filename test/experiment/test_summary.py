@@ -244,7 +244,7 @@ def test_table_says_what_the_nodes_take_of_the_processor():
     assert "processor" not in format_summary(summary)
     summary["processor"] = {"mock_bus": 0.2, "scp_controller": 0.254}
     table = format_summary(summary)
-    assert "45 % of one core; most of it scp_controller: 25 %" in table
+    assert "45 % of one core (the mock 20 %); scp_controller 25 %" in table
     assert max(len(line) for line in table.splitlines()) <= 80
 
 

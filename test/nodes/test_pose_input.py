@@ -183,6 +183,23 @@ def test_status_comes_regularly_and_counts(mocap):
     assert counts[0] > 0
 
 
+def test_all_poses_of_quick_cameras_are_taken_and_few_passed_on():
+    with Graph() as graph:
+        mocap = Mocap(graph, max_rate_hz=20.0)
+        mocap.send_until_valid()
+        graph.every(0.01, lambda: mocap.send(graph.now_ns()))
+        first = mocap.status.last
+        graph.wait_for(
+            lambda: mocap.status.last.accepted >= first.accepted + 200, 30.0, "two hundred poses"
+        )
+        last = mocap.status.last
+        stamps = [stamp_ns(message) for message in mocap.odometry.messages]
+    assert stamps == sorted(stamps)
+    span_s = (stamp_ns(last) - stamp_ns(first)) * 1e-9
+    passed_on = sum(stamp_ns(first) < stamp <= stamp_ns(last) for stamp in stamps)
+    assert 10.0 * span_s < passed_on <= 20.0 * span_s + 2
+
+
 def test_reliable_poses_of_a_frame_that_is_named_are_taken_and_no_others():
     with Graph() as graph:
         mocap = Mocap(graph, ReliabilityPolicy.RELIABLE, pose_frames=["mocap_volume"])

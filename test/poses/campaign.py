@@ -28,8 +28,10 @@ def table(found: Sequence[tuple[Row, Outcome]]) -> str:
         )
         said = "; ".join(outcome.texts) or "-"
         said = (said if len(said) <= 160 else said[:157] + "...").replace("|", "/")
-        if outcome.violations:
-            said += " **" + "; ".join(outcome.violations) + "**"
+        if outcome.tries > 1:
+            said += f" (try {outcome.tries})"
+        if outcome.failures:
+            said += " **" + "; ".join(outcome.failures) + "**"
         lines.append(
             f"| {row.name} | {', '.join(outcome.states)} | {said} | "
             f"{_number(outcome.stop_s, 2)} | {errors} | {_number(outcome.back_s, 2)} |"
@@ -51,11 +53,11 @@ def run(rows: Sequence[Row]) -> list[tuple[Row, Outcome]]:
                     outcome = rig.run(row)
                 except AssertionError as error:
                     outcome = Outcome(violations=[f"not carried out: {str(error).splitlines()[0]}"])
-                if not outcome.violations:
+                if not outcome.failures:
                     break
-                print(f"  {row.name}, try {attempt}: {'; '.join(outcome.violations)}", flush=True)
+                print(f"  {row.name}, try {attempt}: {'; '.join(outcome.failures)}", flush=True)
             found.append((row, outcome))
-            print(f"{row.name}: {'VIOLATED' if outcome.violations else 'ok'}", flush=True)
+            print(f"{row.name}: {'VIOLATED' if outcome.failures else 'ok'}", flush=True)
     return found
 
 
@@ -79,7 +81,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     path = given.out / "pose_faults.md"
     path.write_text(f"# Faults of the motion capture\n\n{table(found)}")
     print(f"written to {path}")
-    return EXIT_VIOLATED if any(outcome.violations for _, outcome in found) else EXIT_OK
+    return EXIT_VIOLATED if any(outcome.failures for _, outcome in found) else EXIT_OK
 
 
 if __name__ == "__main__":

@@ -28,7 +28,8 @@ _NEAR_M = 0.02
 _NEWEST = 100
 _TRIES = 4
 _STALL_S = 0.05
-"""Nodes that are later than this took half of the time for which an input counts as fresh."""
+"""Half of the time for which an input counts as fresh: lateness adds up on the way to the bus."""
+_STATUS_PERIOD_S, _TRUTH_PERIOD_S = 0.1, 0.02
 
 _CONTROLLER = {
     getattr(ControllerState, name): name.removeprefix("STATUS_")
@@ -49,8 +50,10 @@ class Outcome:
             truth, while the fault lasted and from then on [m].
         error_before_m: the same before.
         back_s: from the end of the fault until the reference was followed [s]; 0 if always.
-        stalled_s: by how much the nodes, all together, were later than their periods at worst [s].
-        violations: what must not be.
+        stalled_s: by how much the nodes were later than their periods at worst, all together [s].
+        violations: what must not be, but for what keeps nodes waiting.
+        dangers: what must not be in any case.
+        tries: how often it was tried.
     """
 
     states: list[str] = dataclasses.field(default_factory=list)
@@ -62,6 +65,12 @@ class Outcome:
     back_s: float = math.nan
     stalled_s: float = 0.0
     violations: list[str] = dataclasses.field(default_factory=list)
+    dangers: list[str] = dataclasses.field(default_factory=list)
+    tries: int = 1
+
+    @property
+    def failures(self) -> list[str]:
+        return [*self.dangers, *self.violations]
 
 
 class Rig:
@@ -80,22 +89,26 @@ class Rig:
     def run(self, row: Row) -> Outcome:
         """Let a fault happen and judge what becomes of it.
 
-        Once more where the machine kept nodes waiting, for that shows nothing.
+        Once more where the machine kept nodes waiting, for that shows nothing, unless the robot
+        was in danger: that must not be on any machine.
 
         Raises:
             AssertionError: the robot did not get as far.
         """
-        for _ in range(_TRIES):
+        for tries in range(1, _TRIES + 1):
             try:
                 outcome = self._run(row)
             except BaseException:
                 self._stop()
                 raise
-            if not outcome.violations:
+            outcome.tries = tries
+            if not outcome.failures:
                 break
             self._stop()
-            if outcome.stalled_s < _STALL_S:
+            if outcome.dangers or outcome.stalled_s < _STALL_S:
                 break
+            late = f"nodes were {outcome.stalled_s:.2f} s late"
+            print(f"  {row.name}, {late}: {'; '.join(outcome.violations)}", flush=True)
         return outcome
 
     def _start(self) -> None:
@@ -171,7 +184,8 @@ class Rig:
                 now_ns - newest > 5e8
                 and head is not None
                 and head.status == PoseStatus.STATUS_VALID
-                and self._largest_error(self._robot.truth.messages[-1:], 0, math.inf) < _NEAR_M
+                and self._largest_error(self._robot.truth.messages[-1:], 0, math.inf, _NEWEST)
+                < _NEAR_M
             )
 
         self._robot.graph.wait_for(steady, _LONGEST_S, "a head that follows steadily")
@@ -214,7 +228,7 @@ class Rig:
         found.error_before_m = self._largest_error(truth, 0, asked_ns)
         found.error_m = self._largest_error(truth, asked_ns, end_ns)
         found.error_after_m = self._largest_error(truth, end_ns, math.inf)
-        found.stalled_s = self._stalled_s()
+        found.stalled_s = self._stalled_s(asked_ns)
         self._judge_stop(row, asked_ns, end_ns, found)
         self._judge_safety(truth, found)
         if row.says and not any(row.says in status.text for status in heard):
@@ -237,7 +251,7 @@ class Rig:
                 found.violations.append("the robot was not stopped")
             return
         if any(np.any(c.velocity) for c in commands if stamp_ns(c) == rest_ns):
-            found.violations.append("a command to move although the controller says it stopped")
+            found.dangers.append("a command to move although the controller says it stopped")
         if row.stops is False:
             texts = {s.text: None for s in states if _stopped_by_pose(s)}
             found.violations.append(f"the robot was stopped: {'; '.join(texts)}")
@@ -259,33 +273,39 @@ class Rig:
         if moved:
             found.violations.append(f"{len(moved)} commands to move while it lasted")
 
-    def _stalled_s(self) -> float:
-        """Sum over mock, pose input and controller of how late they were at worst [s].
+    def _stalled_s(self, since_ns: int) -> float:
+        """Sum over mock, pose input and controller of how late each was at worst [s].
 
-        From what each of them says by its own clock, whatever becomes of the poses.
+        From what each of them says at its own pace, whatever becomes of the poses.
         """
         late = 0.0
-        for recorder in (self._robot.truth, self._head, self._robot.states):
-            gaps = np.diff([stamp_ns(message) for message in recorder.messages]) * 1e-9
-            late += float(np.max(gaps, initial=0.0) - np.median(gaps)) if len(gaps) else 0.0
+        for recorder, period_s in (
+            (self._robot.truth, _TRUTH_PERIOD_S),
+            (self._head, _STATUS_PERIOD_S),
+            (self._robot.states, 1.0 / self._config.scp_controller.rate_hz),
+        ):
+            stamps = [stamp_ns(m) for m in recorder.messages if stamp_ns(m) >= since_ns]
+            late += max(0.0, np.max(np.diff(stamps), initial=0) * 1e-9 - period_s)
         return late
 
     def _judge_safety(self, truth: list[PlantState], found: Outcome) -> None:
         if truth[-1].fallen:
-            found.violations.append("the robot fell")
+            found.dangers.append("the robot fell")
         robot = self._config.robot
         phi = np.array([state.phi for state in truth])
         for i, name in enumerate(robot.joint_names):
             lower, upper = robot.joint_range(i + 1)
             if phi[:, i].min() < lower or phi[:, i].max() > upper:
-                found.violations.append(f"{name} left its range")
+                found.dangers.append(f"{name} left its range")
 
-    def _largest_error(self, truth: list[PlantState], begin_ns: float, end_ns: float) -> float:
-        """Largest distance of the true head from its reference between two times [m]."""
-        # Of a short time, the newest will do: this is asked often.
-        references: list[Any] = self._robot.references.messages
-        if len(truth) <= 1:
-            references = references[-_NEWEST:]
+    def _largest_error(
+        self, truth: list[PlantState], begin_ns: float, end_ns: float, newest: int = 0
+    ) -> float:
+        """Largest distance of the true head from its reference between two times [m].
+
+        ``newest``: look for it among so many references only, for who asks often; 0: all.
+        """
+        references: list[Any] = self._robot.references.messages[-newest:]
         times = np.array([stamp_ns(m) for m in references])
         places = np.array([array(m.pose.position) for m in references])
         largest = math.nan

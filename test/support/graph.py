@@ -91,7 +91,8 @@ class Graph:
         self.environment = os.environ | ours
         self._processes: list[Process] = []
         self._pause = threading.Event()
-        self._clients: dict[tuple[type, str, int, int | None], Any] = {}
+        self._clients: dict[tuple[type, str], Any] = {}
+        self._probes: dict[tuple[str, int, int], Any] = {}
         self._stop = threading.Event()
         # rcl reads these from the environment of the process while it initialises a context.
         before = {name: os.environ.get(name) for name in ours}
@@ -197,21 +198,28 @@ class Graph:
         deadline = time.monotonic() + timeout_s
         self.wait_for(client.service_is_ready, timeout_s, f"service {name}")
         self._wait_until_known_to(node_name, timeout_s)
-        future = client.call_async(request)
-        self.wait_for(future.done, max(1.0, deadline - time.monotonic()), f"a reply of {name}")
+        future, replied = client.call_async(request), threading.Event()
+        future.add_done_callback(lambda _: replied.set())
+        left = max(1.0, deadline - time.monotonic())
+        # At once: what tests measure begins with a reply.
+        self.wait_for(future.done, left, f"a reply of {name}", wake=replied)
         return future.result()
 
-    def _client(self, service: type, name: str, newer_than: int | None = None) -> Any:
-        """A client, the same one each time, for the test's node waits for all that it has.
-
-        After the start of a process there are new ones: it discovers them in their order, and
-        ``_wait_until_known_to`` builds on that.
-        """
-        key = service, name, len(self._processes), newer_than
+    def _client(self, service: type, name: str) -> Any:
+        """A client, the same one each time, for the test's node waits for all that it has."""
+        key = service, name
         if key not in self._clients:
             self._clients[key] = self.node.create_client(service, name)
-            self._executor.wake()
         return self._clients[key]
+
+    def _probe(self, node_name: str) -> Any:
+        """A client of a node that is newer than all others but probes, and than its process."""
+        others = sum(client not in self._probes.values() for client in self.node.clients)
+        key = node_name, others, len(self._processes)
+        if key not in self._probes:
+            name = f"/{node_name}/get_parameters"
+            self._probes[key] = self.node.create_client(GetParameters, name)
+        return self._probes[key]
 
     def _wait_until_known_to(self, node_name: str, timeout_s: float) -> None:
         """Wait until a node has discovered all clients made so far.
@@ -219,8 +227,7 @@ class Graph:
         A reply is lost while the server has not discovered its client, which the client cannot see.
         Clients are announced in order: when a newer one gets replies, the older ones will, too.
         """
-        ours = sum(newer_than is None for *_, newer_than in self._clients)
-        probe = self._client(GetParameters, f"/{node_name}/get_parameters", newer_than=ours)
+        probe = self._probe(node_name)
         self.wait_for(probe.service_is_ready, timeout_s, f"parameters of {node_name}")
         questions: list[tuple[float, Any]] = []
 
@@ -282,8 +289,16 @@ class Graph:
         """Time of the clock that stamps messages [ns]."""
         return self.node.get_clock().now().nanoseconds
 
-    def wait_for(self, condition: Callable[[], _Result], timeout_s: float, what: str) -> _Result:
+    def wait_for(
+        self,
+        condition: Callable[[], _Result],
+        timeout_s: float,
+        what: str,
+        wake: threading.Event | None = None,
+    ) -> _Result:
         """Wait until ``condition()`` is true and return what it returned.
+
+        It is looked at every 20 ms, and when ``wake`` is set.
 
         Raises:
             AssertionError: it was not within ``timeout_s``, or a process failed meanwhile; names
@@ -304,7 +319,7 @@ class Graph:
                 raise AssertionError(f"{what}: {why}\n{self.report()}")
             # Not at every message: of a whole robot there are hundreds each second, and what the
             # test takes of the processor its nodes do not get.
-            self._pause.wait(min(_LOOK_EVERY_S, left))
+            (wake or self._pause).wait(min(_LOOK_EVERY_S, left))
 
     def _spin(self) -> None:
         while not self._stop.is_set():
