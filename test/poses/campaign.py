@@ -44,7 +44,10 @@ def _number(value: float, digits: int) -> str:
 
 
 def run(rows: Sequence[Row]) -> list[tuple[Row, Outcome]]:
-    """Run rows in order on one graph; one that failed once more, as a busy machine may be why."""
+    """Run rows in order on one graph; one that failed once more, as a busy machine may be why.
+
+    Not one that put the robot in danger.
+    """
     found = []
     with Rig() as rig:
         for row in rows:
@@ -53,7 +56,7 @@ def run(rows: Sequence[Row]) -> list[tuple[Row, Outcome]]:
                     outcome = rig.run(row)
                 except AssertionError as error:
                     outcome = Outcome(violations=[f"not carried out: {str(error).splitlines()[0]}"])
-                if not outcome.failures:
+                if not outcome.violations or outcome.dangers:
                     break
                 print(f"  {row.name}, try {attempt}: {'; '.join(outcome.failures)}", flush=True)
             found.append((row, outcome))
